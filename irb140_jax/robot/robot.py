@@ -1,0 +1,98 @@
+"""The robot as a pytree: every number is a leaf, so everything can be fitted, batched and differentiated."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from irb140_jax.types import Inertials, Joints, Mat3, Vec3
+
+
+class Robot(eqx.Module):
+    """A serial chain of n hinges and slides.
+
+    Link i moves with joint i.  Its frame sits on the axis of joint i, and at q = reference it is placed in the frame
+    of link i-1 (the base for i = 0) by `rotation[i]`, `position[i]`.
+
+    Attributes:
+        rotation: Orientation of frame i in frame i-1 at q = reference, shape (n, 3, 3).
+        position: Origin of frame i in frame i-1 at q = reference [m], shape (n, 3).
+        axis: Unit vector of joint i in frame i, shape (n, 3).
+        reference: Joint coordinate at which the chain is in the pose that `rotation`, `position` give [rad or m].
+        mass: Link masses [kg], shape (n,).
+        com: Centres of mass in the link frame [m], shape (n, 3).
+        inertia: Inertia tensors about the centre of mass, link axes [kg m^2], shape (n, 3, 3).
+        armature: Rotor inertia on the joint side [kg m^2 or kg].
+        damping: Viscous friction of the model [N m s/rad or N s/m].
+        frictionloss: Dry friction of the model [N m or N].
+        stiffness: Joint spring of the model [N m/rad or N/m].
+        springref: Rest position of that spring [rad or m].
+        gear: Joint torque per unit of actuator control, 1 where a joint has no actuator.
+        gravity: Gravity vector in base axes [m/s^2], shape (3,).
+        base_rotation: Orientation of the base in the world, shape (3, 3).
+        base_position: Position of the base in the world [m], shape (3,).
+        tool_rotation: Orientation of the tool in the last link's frame, shape (3, 3).
+        tool_position: Position of the tool in the last link's frame [m], shape (3,).
+        lower, upper: Joint limits [rad or m]; +-inf where the model gives none.
+        velocity_limit: Largest joint speed [rad/s or m/s]; inf where the model gives none.
+        effort_limit: Largest joint torque [N m or N]; inf where the model gives none.
+        joint_names: Names, in the order of the chain.
+        is_slide: True for prismatic joints.
+        name: The model's name.
+    """
+
+    rotation: Float[Array, "n 3 3"]
+    position: Float[Array, "n 3"]
+    axis: Float[Array, "n 3"]
+    reference: Joints
+    mass: Joints
+    com: Float[Array, "n 3"]
+    inertia: Float[Array, "n 3 3"]
+    armature: Joints
+    damping: Joints
+    frictionloss: Joints
+    stiffness: Joints
+    springref: Joints
+    gear: Joints
+    gravity: Vec3
+    base_rotation: Mat3
+    base_position: Vec3
+    tool_rotation: Mat3
+    tool_position: Vec3
+    lower: Joints
+    upper: Joints
+    velocity_limit: Joints
+    effort_limit: Joints
+    joint_names: tuple[str, ...] = eqx.field(static=True)
+    is_slide: tuple[bool, ...] = eqx.field(static=True)
+    name: str = eqx.field(static=True, default="robot")
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joint_names)
+
+    @property
+    def phi(self) -> Inertials:
+        """Inertial parameters of each link about its frame, [m, m c, Ixx, Ixy, Ixz, Iyy, Iyz, Izz], shape (n, 10)."""
+        first = self.mass[:, None] * self.com
+        c2 = jnp.sum(self.com**2, axis=-1)[:, None, None]
+        outer = self.com[:, :, None] * self.com[:, None, :]
+        about_origin = self.inertia + self.mass[:, None, None] * (c2 * jnp.eye(3) - outer)
+        rows, cols = jnp.triu_indices(3)
+        return jnp.concatenate([self.mass[:, None], first, about_origin[:, rows, cols]], axis=1)
+
+
+def with_phi(robot: Robot, phi: Inertials) -> Robot:
+    """The same robot with other inertial parameters (see `Robot.phi`), shape (n, 10).
+
+    A link of zero mass gets its centre of mass at the frame's origin.
+    """
+    mass = phi[:, 0]
+    com = phi[:, 1:4] / jnp.where(mass == 0.0, 1.0, mass)[:, None]
+    rows, cols = jnp.triu_indices(3)
+    upper = jnp.zeros((phi.shape[0], 3, 3)).at[:, rows, cols].set(phi[:, 4:])
+    about_origin = upper + jnp.swapaxes(jnp.triu(upper, 1), 1, 2)
+    c2 = jnp.sum(com**2, axis=-1)[:, None, None]
+    inertia = about_origin - mass[:, None, None] * (c2 * jnp.eye(3) - com[:, :, None] * com[:, None, :])
+    where = lambda r: (r.mass, r.com, r.inertia)  # noqa: E731
+    return eqx.tree_at(where, robot, (mass, com, inertia))

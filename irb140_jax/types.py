@@ -1,0 +1,13 @@
+"""Names for array shapes, used in every signature.  n is the number of joints, T of samples."""
+
+from jaxtyping import Array, Float
+
+Scalar = Float[Array, ""]
+Joints = Float[Array, " n"]
+JointMatrix = Float[Array, "n n"]
+Vec3 = Float[Array, "3"]
+Mat3 = Float[Array, "3 3"]
+Pose = Float[Array, "4 4"]
+Inertials = Float[Array, "n 10"]
+Samples = Float[Array, " T"]
+JointSamples = Float[Array, "T n"]
