@@ -1,1 +1,19 @@
-"""To come."""
+"""Where the links are and how fast they move: forward kinematics, Jacobians, singularity."""
+
+from irb140_jax.kinematics.dh import IRB140_DH as IRB140_DH
+from irb140_jax.kinematics.dh import DHTable as DHTable
+from irb140_jax.kinematics.dh import dh_forward as dh_forward
+from irb140_jax.kinematics.dh import dh_transform as dh_transform
+from irb140_jax.kinematics.dh import irb140_end_point as irb140_end_point
+from irb140_jax.kinematics.forward import axis_rotation as axis_rotation
+from irb140_jax.kinematics.forward import forward_kinematics as forward_kinematics
+from irb140_jax.kinematics.forward import link_frames as link_frames
+from irb140_jax.kinematics.forward import link_poses as link_poses
+from irb140_jax.kinematics.forward import pose as pose
+from irb140_jax.kinematics.jacobian import LinkJacobians as LinkJacobians
+from irb140_jax.kinematics.jacobian import cross as cross
+from irb140_jax.kinematics.jacobian import jacobian as jacobian
+from irb140_jax.kinematics.jacobian import joint_velocities as joint_velocities
+from irb140_jax.kinematics.jacobian import link_jacobians as link_jacobians
+from irb140_jax.kinematics.singularity import condition_number as condition_number
+from irb140_jax.kinematics.singularity import singular_values as singular_values
