@@ -1,0 +1,292 @@
+"""Recordings of an arm in which MuJoCo hides physics: what a diagnosis is judged on.
+
+A controller that knows the nominal model drives a true arm with wrong inertials and hidden effects.  The truth is
+sealed by its hash before anyone sees the recordings, so that a diagnosis can be shown to have been blind.
+"""
+
+import dataclasses
+import hashlib
+import importlib.resources
+import json
+import math
+import pathlib
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from irb140_jax.errors import InputError
+from irb140_jax.recordings.concealed.catalogue import FIRST_NINE, hidden_kind
+from irb140_jax.recordings.concealed.closed_loop import Log, closed_loop
+from irb140_jax.recordings.concealed.hidden import Hidden, Survey, survey_of
+from irb140_jax.recordings.concealed.plant import arm_model, arm_spec, perturb_inertials
+from irb140_jax.recordings.excite import Excitation, three_motions
+from irb140_jax.recordings.recording import Recording
+from irb140_jax.robot import robot_from_model
+
+
+@dataclasses.dataclass(frozen=True)
+class Concealment:
+    """One effect to hide.
+
+    Attributes:
+        effect: Its name in the vocabulary.
+        joints: The joints it acts on, by name; all of them for effects that act everywhere, then best left empty.
+        share: RMS of its torque as a share of the joint's torque RMS.
+        parameters: Parameters given instead of drawn; when all are given, `share` is not used.
+    """
+
+    effect: str
+    joints: tuple[str, ...] = ()
+    share: float = 0.1
+    parameters: dict[str, float] = dataclasses.field(default_factory=dict)
+
+
+@dataclasses.dataclass(frozen=True)
+class Noise:
+    """What the sensors add to the log.
+
+    Attributes:
+        encoder: Standard deviation of joint positions [rad or m].
+        resolution: Step of the encoders [rad or m]; 0: none.
+        torque: Standard deviation of the torque, as a share of each joint's torque RMS.
+    """
+
+    encoder: float = 2e-5
+    resolution: float = 0.0
+    torque: float = 0.01
+
+
+@dataclasses.dataclass(frozen=True)
+class Secret:
+    """What only the judge may look at.
+
+    Attributes:
+        hidden: The effects.
+        logs: What really happened, one a recording, at every step of the engine.
+        rigid: The true arm without the hidden effects: wrong inertials only.
+        true: The true arm, effects that MuJoCo has natively included.
+        nominal: What the controller believed.
+        survey: What the nominal arm does along the motions.
+    """
+
+    hidden: tuple[Hidden, ...]
+    logs: tuple[Log, ...]
+    rigid: mujoco.MjModel
+    true: mujoco.MjModel
+    nominal: mujoco.MjModel
+    survey: Survey
+
+
+@dataclasses.dataclass(frozen=True)
+class ConcealedCase:
+    """Recordings with physics concealed in them.
+
+    Attributes:
+        recordings: What the diagnosis gets.
+        robot_source: The nominal model: path of an MJCF file, or MJCF text.
+        truth: What was hidden: effects, joints, parameters with units, shares.
+        seal: SHA-256 of the truth, fit to be published before the diagnosis.
+        secret: What a judge may look at besides.
+    """
+
+    recordings: tuple[Recording, ...]
+    robot_source: str
+    truth: dict
+    seal: str
+    secret: Secret
+
+
+def conceal(
+    mjcf: str | pathlib.Path, concealments: Sequence[Concealment] = (), motions: Sequence[Excitation] | None = None, *,
+    seed: int, noise: Noise | None = None, inertial_error: float = 0.05, rate: float = 500.0, with_speeds: bool = False,
+) -> ConcealedCase:
+    """Hide effects in an arm and record it in closed loop.
+
+    tau_logged = M qdd + C qd + g + sum of the effects + noise, by MuJoCo, with wrong inertials in M, C and g
+
+    Args:
+        mjcf: The nominal model, a path or MJCF text.
+        concealments: The effects to hide; none for a clean case.
+        motions: What to play; sampled at the step of the engine.  By default Fourier, point to point, and slow.
+        seed: Everything random is drawn from it, each thing from a stream of its own.
+        noise: Sensor noise, by default that of a good arm.
+        inertial_error: Relative standard deviation of the true inertials about the nominal ones.
+        rate: Samples per second of the recordings [1/s].
+        with_speeds: Whether the recordings hold qd and qdd (true ones, without noise) as well.
+
+    Returns:
+        The case.
+
+    Raises:
+        InputError: Unknown effect, joint or parameter.
+    """
+    spec = arm_spec(mjcf)
+    robot = robot_from_model(spec.compile(), source=str(mjcf)[:80])
+    motions = list(motions) if motions is not None else three_motions(robot, seed=seed)
+    dt = float(motions[0].t[1] - motions[0].t[0])
+    nominal = arm_model(spec, dt)
+    survey = survey_of(nominal, motions, every=max(1, round(0.01 / dt)))
+    hidden = tuple(_resolved(c, survey, robot.joint_names, seed, k) for k, c in enumerate(concealments))
+    rigid, true = _true_models(mjcf, hidden, robot.joint_names, dt, inertial_error, seed)
+    logs = tuple(closed_loop(nominal, true, hidden, motion, recording=k) for k, motion in enumerate(motions))
+    noise = noise or Noise()
+    step = max(1, round(1.0 / (rate * dt)))
+    rngs = [np.random.default_rng([seed, 30, k]) for k in range(len(logs))]
+    recordings = tuple(
+        _recording(log, motion.name, robot.joint_names, survey, noise, step, with_speeds, rng)
+        for log, motion, rng in zip(logs, motions, rngs, strict=True)
+    )
+    truth = {
+        "schema": 1, "seed": seed, "inertial_error": inertial_error,
+        "effects": [
+            {**h.told(robot.joint_names, robot.is_slide), "share": h.share(survey)} for h in hidden
+        ],
+        "link_masses": {
+            true.body(int(b)).name or f"body {b}": {"nominal": float(nominal.body_mass[b]),
+                                                    "true": float(rigid.body_mass[b])}
+            for b in nominal.jnt_bodyid
+        },
+    }
+    secret = Secret(hidden, logs, rigid, true, nominal, survey)
+    return ConcealedCase(recordings, str(mjcf), truth, seal(truth), secret)
+
+
+def demo_case(seed: int, *, duration: float = 20.0, rate: float = 1000.0) -> ConcealedCase:
+    """The IRB 140 with one of the first nine effects hidden in it, at 6 to 20 % of the joint's torque.
+
+    Args:
+        seed: Draws effect, joint, strength, shapes, inertials, motions and noise.
+        duration: Length of each recording [s].
+        rate: Steps of the engine per second [1/s].
+
+    Returns:
+        The case; inertials are 5 % wrong.
+    """
+    return _irb140_case(seed, duration, rate, clean=False)
+
+
+def clean_case(seed: int, *, duration: float = 20.0, rate: float = 1000.0) -> ConcealedCase:
+    """The IRB 140 with nothing hidden in it: wrong inertials and sensor noise only (see `demo_case`)."""
+    return _irb140_case(seed, duration, rate, clean=True)
+
+
+def seal(truth: dict) -> str:
+    """SHA-256 of the truth, written as JSON with sorted keys."""
+    return hashlib.sha256(json.dumps(truth, sort_keys=True).encode()).hexdigest()
+
+
+def irb140_path() -> pathlib.Path:
+    """The IRB 140 model that ships with the package, or that of the source tree."""
+    shipped = pathlib.Path(str(importlib.resources.files("irb140_jax"))) / "assets" / "irb140.xml"
+    return shipped if shipped.exists() else shipped.parents[2] / "assets" / "irb140.xml"
+
+
+def _irb140_case(seed: int, duration: float, rate: float, *, clean: bool) -> ConcealedCase:
+    path = irb140_path()
+    spec = arm_spec(path)
+    robot = robot_from_model(spec.compile(), source=str(path))
+    motions = three_motions(robot, duration, rate, seed=seed)
+    concealments = []
+    if not clean:
+        rng = np.random.default_rng([seed, 40])
+        survey = survey_of(arm_model(spec, 1.0 / rate), motions, every=max(1, round(0.02 * rate)))
+        effect = str(rng.choice(FIRST_NINE))
+        sites = meaningful_sites(effect, survey)
+        joints = sites[rng.integers(len(sites))]
+        concealments = [
+            Concealment(effect, tuple(robot.joint_names[j] for j in joints), share=float(rng.uniform(0.06, 0.2)))
+        ]
+    return conceal(path, concealments, motions, seed=seed)
+
+
+def meaningful_sites(effect: str, survey: Survey) -> list[tuple[int, ...]]:
+    """Joints on which an effect is something of its own, not another effect under its name.
+
+    A torque gain or load-dependent friction on a joint that carries nothing but its own rotor is, in any data, a
+    rotor inertia or Coulomb friction.  A coupling is felt on both joints only where their torques are comparable.
+
+    Args:
+        effect: Name in the vocabulary.
+        survey: What the nominal arm does.
+
+    Returns:
+        Groups of joint indices, never empty.
+    """
+    n = survey.q.shape[1]
+    if hidden_kind(effect).joints_acted_on == 0:
+        return [tuple(range(n))]
+    if hidden_kind(effect).joints_acted_on == 2:
+        pairs = [(j, j + 1) for j in range(n - 1) if survey.is_slide(j) == survey.is_slide(j + 1)]
+        if not pairs:
+            raise InputError(f"{effect} needs two neighbouring joints of one kind; this robot has none")
+        ratio = [abs(math.log(survey.rms(i) / survey.rms(j))) for i, j in pairs]
+        near = [pair for pair, r in zip(pairs, ratio, strict=True) if r < math.log(6.0)]
+        return near or [pairs[int(np.argmin(ratio))]]
+    own = np.array([_own_share(survey, j) for j in range(n)])
+    if effect in ("torque_gain", "rotor_inertia"):
+        carrying = [(j,) for j in range(n) if own[j] > 0.15]
+        return carrying or [(int(np.argmax(own)),)]
+    return [(j,) for j in range(n)]
+
+
+def _own_share(survey: Survey, joint: int) -> float:
+    """Share of a joint's torque (RMS) that is not in proportion to its own acceleration."""
+    tau, qdd = survey.load[:, joint], survey.qdd[:, joint]
+    rest = tau - qdd * (tau @ qdd) / max(float(qdd @ qdd), 1e-300)
+    return float(np.linalg.norm(rest) / max(float(np.linalg.norm(tau)), 1e-300))
+
+
+def _resolved(concealment: Concealment, survey: Survey, names: Sequence[str], seed: int, k: int) -> Hidden:
+    """The effect with its joints looked up, its shapes drawn and its amplitude set."""
+    kind = hidden_kind(concealment.effect)
+    rng = np.random.default_rng([seed, 10, k])
+    for name in concealment.joints:
+        if name not in names:
+            raise InputError(f"{concealment.effect}: no joint {name!r}; the robot has {', '.join(names)}")
+    if set(concealment.parameters) - set(kind.units):
+        raise InputError(f"{concealment.effect}: parameters are {', '.join(kind.units)}; "
+                         f"got {', '.join(concealment.parameters)}")
+    joints = tuple(list(names).index(name) for name in concealment.joints)
+    if kind.joints_acted_on == 0:
+        joints = tuple(range(len(names)))
+    elif len(joints) != kind.joints_acted_on:
+        raise InputError(f"{concealment.effect} acts on {kind.joints_acted_on} joint(s); got {len(joints)}")
+    drawn = kind.drawn(joints, concealment.share, survey, rng)
+    return kind(joints, {**drawn.parameters, **concealment.parameters})
+
+
+def _true_models(
+    mjcf: str | pathlib.Path, hidden: Sequence[Hidden], names: Sequence[str], dt: float, error: float, seed: int
+) -> tuple[mujoco.MjModel, mujoco.MjModel]:
+    """The arm with wrong inertials, and the same arm with the native effects in it."""
+    models = []
+    for effects in ((), hidden):
+        spec = arm_spec(mjcf)
+        for effect in effects:
+            effect.edit(spec, names)
+        model = arm_model(spec, dt)
+        perturb_inertials(model, error, np.random.default_rng([seed, 20]))
+        dofs = np.array([model.joint(name).dofadr[0] for name in names])
+        for effect in effects:
+            effect.install(model, dofs)
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        models.append(model)
+    return models[0], models[1]
+
+
+def _recording(
+    log: Log, name: str, names: Sequence[str], survey: Survey, noise: Noise, step: int, with_speeds: bool,
+    rng: np.random.Generator,
+) -> Recording:
+    """What the sensors make of a log."""
+    pick = slice(None, None, step)
+    q = log.q[pick] + noise.encoder * rng.normal(size=log.q[pick].shape)
+    if noise.resolution > 0.0:
+        q = noise.resolution * np.round(q / noise.resolution)
+    rms = np.array([survey.rms(j) for j in range(len(names))])
+    tau = log.tau[pick] + noise.torque * rms * rng.normal(size=log.tau[pick].shape)
+    return Recording(
+        t=log.t[pick], q=q, tau=tau, qd=log.qd[pick] if with_speeds else None,
+        qdd=log.qdd[pick] if with_speeds else None, extras={}, joint_names=tuple(names), source=name, notes=(),
+    )

@@ -1,0 +1,83 @@
+"""The loop that drives the true arm along a motion with a controller that knows the nominal one only."""
+
+import copy
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from irb140_jax.recordings.concealed.hidden import Hidden, Plant
+from irb140_jax.recordings.excite import Excitation
+
+BANDWIDTH = 60.0  # [rad/s] of the position loop, some 10 Hz: usual for an arm of this size
+
+
+class Log(NamedTuple):
+    """What happened, at every step of the engine and without sensor noise.
+
+    Attributes:
+        t: Time [s], shape (T,).
+        q: Joint positions as the encoders see them, wrong zeros and motor sides included, shape (T, n).
+        qd, qdd: True joint velocities and accelerations, shape (T, n).
+        tau: What the controller logged, shape (T, n).
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    tau: np.ndarray
+
+
+def closed_loop(
+    nominal: mujoco.MjModel, true: mujoco.MjModel, hidden: Sequence[Hidden], motion: Excitation, *, recording: int = 0
+) -> Log:
+    """Drive the true arm along a motion by computed torque with the nominal model, plus PD.
+
+    tau = ID_nominal(q, qd, qdd_ref + b^2 (q_ref - q) + 2 b (qd_ref - qd)), b the bandwidth
+
+    The torque of step k and the position of step k belong together: the second difference of q around k is the
+    acceleration that the torque of k causes, so the log has no hidden delay.
+
+    Args:
+        nominal: What the controller believes.
+        true: The arm, with native effects already in it; it may have more joints (inside its transmissions).
+        hidden: Effects to apply at every step, in this order.
+        motion: The reference; its sampling is the engine's step.
+        recording: Index of the recording, for effects that act in one recording only.
+
+    Returns:
+        The log, T samples.
+    """
+    n, steps = nominal.nv, motion.t.size
+    true = copy.copy(true)  # effects change friction levels as they go; the next recording starts afresh
+    plant = Plant(true, [nominal.joint(i).name for i in range(n)], recording)
+    for effect in hidden:
+        effect.begin(plant)
+    control, data, dofs = mujoco.MjData(nominal), plant.data, plant.dofs
+    data.qpos[plant.qpos] = motion.q[0] - plant.zero
+    kp, kd = BANDWIDTH**2, 2.0 * BANDWIDTH
+    wanted = motion.qdd + kp * motion.q + kd * motion.qd
+    q, qd, tau = np.empty((steps, n)), np.empty((steps + 1, n)), np.empty((steps, n))
+    acting = [effect for effect in hidden if type(effect).act is not Hidden.act]
+    for k in range(steps):
+        plant.t = motion.t[k]
+        plant.q, plant.qd = data.qpos[plant.qpos], data.qvel[dofs]
+        q[k], qd[k] = plant.q + plant.zero, plant.qd
+        control.qpos[:], control.qvel[:] = q[k], qd[k]
+        control.qacc[:] = wanted[k] - kp * q[k] - kd * qd[k]
+        mujoco.mj_inverse(nominal, control)
+        tau[k] = control.qfrc_inverse + control.qfrc_constraint
+        plant.torque[:], plant.friction[:] = tau[k], plant.own_friction
+        plant.inner[:] = 0.0
+        for effect in acting:
+            effect.act(plant)
+        true.dof_frictionloss[dofs] = plant.friction
+        data.qfrc_applied[:] = plant.inner
+        data.qfrc_applied[dofs] += plant.torque
+        mujoco.mj_step(true, data)
+        # What accelerates and carries the links is what the gear transmitted: applied torque less friction.
+        plant.load = (data.qfrc_applied + data.qfrc_passive + data.qfrc_constraint)[dofs]
+    qd[steps] = data.qvel[dofs]
+    return Log(motion.t, q, qd[:-1], np.diff(qd, axis=0) / plant.dt, tau)
