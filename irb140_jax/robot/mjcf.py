@@ -1,102 +1,134 @@
 """The only reader of robot models: MuJoCo compiles MJCF or URDF, we take a serial chain out of it."""
 
 import pathlib
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 
 from irb140_jax.errors import RobotError
+from irb140_jax.robot.drive import drives
+from irb140_jax.robot.links import link_frames_at_rest, link_inertials, tool_frame
+from irb140_jax.robot.refuse import refuse_unsupported
 from irb140_jax.robot.robot import Robot
+from irb140_jax.robot.urdf import prepared_urdf
 
 
 def load_robot(path: str | pathlib.Path) -> Robot:
     """Read an MJCF or URDF file of a serial chain of hinges and slides.
 
     Args:
-        path: The model file.
+        path: The model file.  MJCF may give speed limits as <custom><numeric name="velocity_limit" data="..."/>.
 
     Returns:
-        The robot, with everything the file says of armature, damping, frictionloss, stiffness and gear.
+        The robot, with everything the file says of armature, damping, frictionloss, stiffness, gear and limits.
 
     Raises:
         RobotError: The file can't be read, or holds what a `Robot` can't represent; the message names it.
     """
     path = pathlib.Path(path)
+    root = _root(path)
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise RobotError(f"{path}: MuJoCo can't compile this model: {error}") from error
-    return robot_from_model(model, source=str(path))
+        if root.tag == "robot":
+            urdf = prepared_urdf(root, str(path))
+            model = mujoco.MjModel.from_xml_string(urdf.text)
+            return robot_from_model(model, str(path), urdf.effort, urdf.velocity, urdf.notes)
+        return robot_from_model(mujoco.MjModel.from_xml_path(str(path)), str(path))
+    except RobotError:
+        raise
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split())
+        raise RobotError(f"{path}: MuJoCo can't compile this model: {reason}: mend the file there") from error
 
 
-def robot_from_model(model: mujoco.MjModel, source: str = "model") -> Robot:
-    """Take the serial chain out of a compiled model; welded bodies are merged into the link that carries them."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = model.qpos0
-    mujoco.mj_kinematics(model, data)
-    n = model.njnt
-    names = tuple(model.joint(i).name for i in range(n))
-    # World pose of every link frame at the reference pose: on the joint anchor, axes of its body.
-    body_of = model.jnt_bodyid
-    origin = data.xanchor.copy()
-    frame = data.xmat[body_of].reshape(n, 3, 3)
-    base_body = model.body_parentid[model.body_rootid[body_of[0]]] if n else 0
-    base_position, base_rotation = data.xpos[base_body].copy(), data.xmat[base_body].reshape(3, 3).copy()
-    parents_R = [base_rotation, *frame[:-1]]
-    parents_p = [base_position, *origin[:-1]]
-    rotation = np.stack([R.T @ F for R, F in zip(parents_R, frame, strict=True)])
-    position = np.stack([R.T @ (o - p) for R, p, o in zip(parents_R, parents_p, origin, strict=True)])
+def robot_from_model(
+    model: mujoco.MjModel,
+    source: str = "model",
+    effort: Mapping[str, float] | None = None,
+    velocity: Mapping[str, float] | None = None,
+    notes: tuple[str, ...] = (),
+) -> Robot:
+    """Take the serial chain out of a compiled model; welded bodies are merged into the link that carries them.
 
-    mass, first, second = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3, 3))
-    for body in range(1, model.nbody):
-        link = _carrier(model, body)
-        if link < 0 or model.body_mass[body] == 0.0 and not model.body_inertia[body].any():
-            continue
-        R_link = frame[link].T
-        c = R_link @ (data.xpos[body] + data.xmat[body].reshape(3, 3) @ model.body_ipos[body] - origin[link])
-        quat_R = np.zeros(9)
-        mujoco.mju_quat2Mat(quat_R, model.body_iquat[body])
-        A = R_link @ data.xmat[body].reshape(3, 3) @ quat_R.reshape(3, 3)
-        m = model.body_mass[body]
-        mass[link] += m
-        first[link] += m * c
-        second[link] += A @ np.diag(model.body_inertia[body]) @ A.T + m * (c @ c * np.eye(3) - np.outer(c, c))
-    com = first / np.where(mass == 0.0, 1.0, mass)[:, None]
-    shift = np.einsum("i,ijk->ijk", mass, (np.einsum("ij,ij->i", com, com)[:, None, None] * np.eye(3)
-                                           - com[:, :, None] * com[:, None, :]))
+    Args:
+        model: Compiled model.
+        source: Where it came from, for messages.
+        effort: Largest torques by joint name [N m or N]; what the model's actuators allow, if less, wins.
+        velocity: Largest speeds by joint name [rad/s or m/s], where the model does not hold them.
+        notes: Plain sentences to keep with the robot.
+
+    Raises:
+        RobotError: The model holds what a `Robot` can't represent.
+    """
+    refuse_unsupported(model, source)
+    names = tuple(model.joint(i).name for i in range(model.njnt))
+    chain = link_frames_at_rest(model)
+    mass, com, inertia = link_inertials(model, chain)
+    drive = drives(model)
     limited = model.jnt_limited.astype(bool)
-    gear = np.ones(n)
-    for a in range(model.nu):
-        if model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT:
-            gear[model.actuator_trnid[a, 0]] = model.actuator_gear[a, 0]
-    last = body_of[-1]
-    tool_p, tool_R = np.zeros(3), np.eye(3)
-    sites = [s for s in range(model.nsite) if model.body_weldid[model.site_bodyid[s]] == model.body_weldid[last]]
-    if sites:
-        mujoco.mj_forward(model, data)
-        tool_p = frame[-1].T @ (data.site_xpos[sites[-1]] - origin[-1])
-        tool_R = frame[-1].T @ data.site_xmat[sites[-1]].reshape(3, 3)
-    as_array = lambda x: jnp.asarray(np.asarray(x, dtype=float))  # noqa: E731
+    spring, damper = _enabled(model, "SPRING"), _enabled(model, "DAMPER")
+    dry = _enabled(model, "FRICTIONLOSS") * _enabled(model, "CONSTRAINT")
+    gravity = _enabled(model, "GRAVITY") * model.opt.gravity
+    tool_rotation, tool_position = tool_frame(model, chain)
+    fields = dict(
+        rotation=chain.rotation, position=chain.position, axis=model.jnt_axis, reference=model.qpos0,
+        mass=mass, com=com, inertia=inertia,
+        armature=model.dof_armature + drive.armature, damping=damper * (model.dof_damping.ravel() + drive.damping),
+        frictionloss=dry * model.dof_frictionloss, stiffness=spring * model.jnt_stiffness.ravel(),
+        springref=model.qpos_spring, gear=drive.gear, gravity=chain.base_rotation.T @ gravity,
+        base_rotation=chain.base_rotation, base_position=chain.base_position,
+        tool_rotation=tool_rotation, tool_position=tool_position,
+        lower=np.where(limited, model.jnt_range[:, 0], -np.inf), upper=np.where(limited, model.jnt_range[:, 1], np.inf),
+        velocity_limit=np.minimum(_velocity_limit(model, source), _by_name(velocity, names)),
+        effort_limit=np.minimum(drive.effort, _by_name(effort, names)),
+    )  # fmt: skip
     return Robot(
-        rotation=as_array(rotation), position=as_array(position), axis=as_array(model.jnt_axis),
-        reference=as_array(model.qpos0), mass=as_array(mass), com=as_array(com), inertia=as_array(second - shift),
-        armature=as_array(model.dof_armature), damping=as_array(model.dof_damping.reshape(n)),
-        frictionloss=as_array(model.dof_frictionloss), stiffness=as_array(model.jnt_stiffness.reshape(n)),
-        springref=as_array(model.qpos_spring), gear=as_array(gear),
-        gravity=as_array(base_rotation.T @ model.opt.gravity),
-        base_rotation=as_array(base_rotation), base_position=as_array(base_position),
-        tool_rotation=as_array(tool_R), tool_position=as_array(tool_p),
-        lower=as_array(np.where(limited, model.jnt_range[:, 0], -np.inf)),
-        upper=as_array(np.where(limited, model.jnt_range[:, 1], np.inf)),
-        velocity_limit=as_array(np.full(n, np.inf)), effort_limit=as_array(np.full(n, np.inf)),
-        joint_names=names, is_slide=tuple(bool(t == mujoco.mjtJoint.mjJNT_SLIDE) for t in model.jnt_type),
-        name=str(source),
+        **{key: jnp.array(value, dtype=float) for key, value in fields.items()},
+        joint_names=names,
+        is_slide=tuple(int(kind) == int(mujoco.mjtJoint.mjJNT_SLIDE) for kind in model.jnt_type),
+        name=_name(model, source),
+        notes=notes,
     )
 
 
-def _carrier(model: mujoco.MjModel, body: int) -> int:
-    """Index of the last joint on the way from the base to this body, -1 if it is fixed to the base."""
-    while body and not model.body_jntnum[body]:
-        body = int(model.body_parentid[body])
-    return int(model.body_jntadr[body] + model.body_jntnum[body] - 1) if body else -1
+def _root(path: pathlib.Path) -> ET.Element:
+    if not path.is_file():
+        raise RobotError(f"{path}: there is no such file: give the MJCF or URDF file of the robot")
+    try:
+        root = ET.parse(path).getroot()
+    except (ET.ParseError, UnicodeDecodeError, LookupError) as error:
+        raise RobotError(f"{path}: not an XML file ({error}): give an MJCF or URDF file") from error
+    if root.tag not in ("mujoco", "robot"):
+        raise RobotError(f"{path}: root element <{root.tag}>; allowed: <mujoco> (MJCF) or <robot> (URDF): convert it")
+    return root
+
+
+def _enabled(model: mujoco.MjModel, part: str) -> float:
+    """0 if <option><flag> switches this part of the physics off, else 1."""
+    return float(not model.opt.disableflags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}")))
+
+
+def _velocity_limit(model: mujoco.MjModel, source: str) -> np.ndarray:
+    i = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, "velocity_limit")
+    if i < 0:
+        return np.full(model.njnt, np.inf)
+    start, size = int(model.numeric_adr[i]), int(model.numeric_size[i])
+    values = model.numeric_data[start : start + size]
+    if size != model.njnt or not np.all(values > 0.0):
+        raise RobotError(
+            f"{source}: <numeric name='velocity_limit'> is {values}; allowed: positive numbers; "
+            f"give one for each of the {model.njnt} joints"
+        )
+    return values
+
+
+def _by_name(values: Mapping[str, float] | None, names: tuple[str, ...]) -> np.ndarray:
+    return np.array([(values or {}).get(name, np.inf) for name in names])
+
+
+def _name(model: mujoco.MjModel, source: str) -> str:
+    """The model's own name; the file's, where it has none but MuJoCo's default."""
+    name = model.names.split(b"\0", 1)[0].decode()
+    return pathlib.Path(source).stem if name in ("", "MuJoCo Model") else name

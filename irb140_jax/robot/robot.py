@@ -4,7 +4,26 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from irb140_jax.errors import RobotError
 from irb140_jax.types import Inertials, Joints, Mat3, Vec3
+
+_PER_JOINT = (
+    "reference mass armature damping frictionloss stiffness springref gear lower upper velocity_limit effort_limit"
+)
+# jaxtyping does not look into the fields of a pytree; a wrong shape would broadcast instead of failing.
+_SHAPES: dict[str, tuple[int | str, ...]] = {
+    "rotation": ("n", 3, 3),
+    "position": ("n", 3),
+    "axis": ("n", 3),
+    "com": ("n", 3),
+    "inertia": ("n", 3, 3),
+    "gravity": (3,),
+    "base_rotation": (3, 3),
+    "base_position": (3,),
+    "tool_rotation": (3, 3),
+    "tool_position": (3,),
+    **{field: ("n",) for field in _PER_JOINT.split()},
+}
 
 
 class Robot(eqx.Module):
@@ -38,6 +57,7 @@ class Robot(eqx.Module):
         joint_names: Names, in the order of the chain.
         is_slide: True for prismatic joints.
         name: The model's name.
+        notes: Plain sentences about what the reader had to supply.
     """
 
     rotation: Float[Array, "n 3 3"]
@@ -65,6 +85,20 @@ class Robot(eqx.Module):
     joint_names: tuple[str, ...] = eqx.field(static=True)
     is_slide: tuple[bool, ...] = eqx.field(static=True)
     name: str = eqx.field(static=True, default="robot")
+    notes: tuple[str, ...] = eqx.field(static=True, default=())
+
+    def __check_init__(self):
+        n = self.n
+        if not n or len(self.is_slide) != n or len(set(self.joint_names)) != n:
+            raise RobotError(
+                f"robot '{self.name}': joint_names {self.joint_names}, is_slide {self.is_slide}; give one of each for "
+                "every joint, at least one joint, no name twice"
+            )
+        for field, shape in _SHAPES.items():
+            expected = tuple(n if size == "n" else size for size in shape)
+            came = jnp.shape(getattr(self, field))
+            if came != expected:
+                raise RobotError(f"robot '{self.name}': {field} has shape {came}; for {n} joints give {expected}")
 
     @property
     def n(self) -> int:

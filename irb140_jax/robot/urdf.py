@@ -1,0 +1,136 @@
+"""URDF as it is found in the field, made ready for MuJoCo: links, inertials and joints, nothing else.
+
+Meshes under package:// paths, transmissions and simulator plugins are not needed for dynamics and often can't be
+resolved, so they are left out.  What a URDF means by leaving something out is kept: a link without <inertial> has none.
+"""
+
+import xml.etree.ElementTree as ET
+from typing import NamedTuple
+
+from irb140_jax.errors import RobotError
+
+# MuJoCo compiles no moving body without mass or inertia; it gets this instead [kg, kg m^2], below any torque seen.
+NEGLIGIBLE = 1e-12
+
+KNOWN_TYPES = ("revolute", "continuous", "prismatic", "fixed")
+
+
+class PreparedURDF(NamedTuple):
+    """A URDF that MuJoCo compiles, and what it would not have kept.
+
+    Attributes:
+        text: The XML.
+        effort: Largest torque by joint name [N m or N], where the file gives one above zero.
+        velocity: Largest speed by joint name [rad/s or m/s], where the file gives one above zero.
+        notes: Plain sentences about what was supplied.
+    """
+
+    text: str
+    effort: dict[str, float]
+    velocity: dict[str, float]
+    notes: tuple[str, ...]
+
+
+def prepared_urdf(robot: ET.Element, source: str) -> PreparedURDF:
+    """Strip a URDF to what dynamics needs.
+
+    Args:
+        robot: Its root element, <robot>.
+        source: The file's name, for messages.
+
+    Raises:
+        RobotError: A xacro file, a joint type or coupling that a serial chain does not have, or broken references.
+    """
+    _refuse(robot, source)
+    bare = ET.Element("robot", {"name": robot.get("name", "robot")})
+    bare.append(_compiler(robot))
+    links = {link.get("name", "") for link in robot.findall("link")}
+    for link in robot.findall("link"):
+        kept = ET.SubElement(bare, "link", {"name": link.get("name", "")})
+        kept.extend(link.findall("inertial"))
+    if "world" not in links and _attributes(robot, "joint/parent", "link") & {"world"}:
+        ET.SubElement(bare, "link", {"name": "world"})
+        links.add("world")
+    for joint in robot.findall("joint"):
+        bare.append(_bare_joint(joint, links, source))
+    effort, velocity = (_limits(robot, key, source) for key in ("effort", "velocity"))
+    return PreparedURDF(ET.tostring(bare, encoding="unicode"), effort, velocity, _notes(robot))
+
+
+def _refuse(robot: ET.Element, source: str) -> None:
+    for element in robot.iter():
+        is_xacro = "xacro" in str(element.tag) or any("${" in value for value in element.attrib.values())
+        if is_xacro:
+            raise RobotError(f"{source}: this is xacro, not a URDF: expand it first (xacro {source} > robot.urdf)")
+    for joint in robot.findall("joint"):
+        name, kind = joint.get("name", ""), joint.get("type", "")
+        if kind not in KNOWN_TYPES:
+            known = ", ".join(KNOWN_TYPES)
+            raise RobotError(f"{source}: joint '{name}' is of type '{kind}'; known: {known}: fix it or remove it")
+        if joint.find("mimic") is not None:
+            raise RobotError(f"{source}: joint '{name}' mimics another; only independent joints are known: make it fixed")
+
+
+def _compiler(robot: ET.Element) -> ET.Element:
+    """MuJoCo's own section, with the options of the file that concern dynamics."""
+    allowed = ("angle", "eulerseq", "balanceinertia", "settotalmass")
+    given = robot.find("mujoco/compiler")
+    options = {} if given is None else {k: v for k, v in given.attrib.items() if k in allowed}
+    bounds = {"boundmass": str(NEGLIGIBLE), "boundinertia": str(NEGLIGIBLE), "fusestatic": "false"}
+    section = ET.Element("mujoco")
+    ET.SubElement(section, "compiler", {**options, **bounds})
+    return section
+
+
+def _bare_joint(joint: ET.Element, links: set[str], source: str) -> ET.Element:
+    name, kind = joint.get("name", ""), joint.get("type", "")
+    for end in ("parent", "child"):
+        element = joint.find(end)
+        link = "" if element is None else element.get("link", "")
+        if link not in links:
+            raise RobotError(f"{source}: joint '{name}' has {end} '{link}', but no such link exists: add or rename it")
+    kept = ET.Element("joint", {"name": name, "type": kind})
+    moving = () if kind == "fixed" else ("axis", "limit", "dynamics")
+    kept.extend(element for tag in ("origin", "parent", "child", *moving) for element in joint.findall(tag))
+    if kind != "fixed" and joint.find("axis") is None:
+        ET.SubElement(kept, "axis", {"xyz": "1 0 0"})  # the default that URDF defines
+    return kept
+
+
+def _limits(robot: ET.Element, key: str, source: str) -> dict[str, float]:
+    """A <limit> attribute by joint; zero is the usual way of saying that nobody knows it."""
+    limits = {}
+    for joint in robot.findall("joint"):
+        element = joint.find("limit")
+        text = "0" if element is None else element.get(key, "0")
+        try:
+            value = float(text)
+        except ValueError as error:
+            name = joint.get("name", "")
+            raise RobotError(f"{source}: joint '{name}' has {key} limit '{text}': give a number") from error
+        if value > 0.0:
+            limits[joint.get("name", "")] = value
+    return limits
+
+
+def _notes(robot: ET.Element) -> tuple[str, ...]:
+    moved = {
+        child.get("link") for joint in robot.findall("joint") if joint.get("type") != "fixed"
+        for child in joint.findall("child")
+    }  # fmt: skip
+    notes = []
+    for link in robot.findall("link"):
+        name, inertia, mass = link.get("name"), link.find("inertial/inertia"), link.find("inertial/mass")
+        if name in moved and (mass is None or not _any(mass, ("value",))):
+            notes.append(f"link '{name}' has no mass of its own in the file")
+        elif name in moved and (inertia is None or not _any(inertia, ("ixx", "iyy", "izz"))):
+            notes.append(f"link '{name}' has no rotational inertia in the file and counts as a point mass")
+    return tuple(notes)
+
+
+def _any(element: ET.Element, keys: tuple[str, ...]) -> bool:
+    return any(element.get(key, "0").strip(" +-0.eE") for key in keys)
+
+
+def _attributes(robot: ET.Element, path: str, key: str) -> set[str]:
+    return {element.get(key, "") for element in robot.findall(path)}
