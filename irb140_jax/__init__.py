@@ -1,10 +1,38 @@
 """Differentiable dynamics of serial arms, and a diagnosis of the physics a model left out."""
 
-import jax
+import importlib
+import os
+import sys
+from typing import TYPE_CHECKING
 
-# Every formula here is meant in double precision; this is the one place that says so.
-jax.config.update("jax_enable_x64", True)
+# Every formula here is meant in double precision; this is the one place that says so.  Through the environment where
+# JAX has yet to be imported, so that `irb140 --help` need not pay for importing it.
+if "jax" in sys.modules:
+    sys.modules["jax"].config.update("jax_enable_x64", True)
+else:
+    os.environ["JAX_ENABLE_X64"] = "1"
 
-from irb140_jax import robot as robot  # noqa: E402
-from irb140_jax.robot import Robot as Robot  # noqa: E402
-from irb140_jax.robot import load_robot as load_robot  # noqa: E402
+if TYPE_CHECKING:
+    from irb140_jax import dynamics as dynamics
+    from irb140_jax import effects as effects
+    from irb140_jax import kinematics as kinematics
+    from irb140_jax import mismatch as mismatch
+    from irb140_jax import oracle as oracle
+    from irb140_jax import recordings as recordings
+    from irb140_jax import report as report
+    from irb140_jax import robot as robot
+    from irb140_jax.robot import Robot as Robot
+    from irb140_jax.robot import load_robot as load_robot
+
+_SUBPACKAGES = ("dynamics", "effects", "kinematics", "mismatch", "oracle", "recordings", "report", "robot")
+_FROM_ROBOT = ("Robot", "load_robot")
+__all__ = [*_SUBPACKAGES, *_FROM_ROBOT]  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str):
+    """Import a public name when it is first used."""
+    if name in _SUBPACKAGES:
+        return importlib.import_module(f"irb140_jax.{name}")
+    if name in _FROM_ROBOT:
+        return getattr(importlib.import_module("irb140_jax.robot"), name)
+    raise AttributeError(f"module 'irb140_jax' has no attribute {name!r}; it has {', '.join(__all__)}")

@@ -1,0 +1,90 @@
+"""The diagnosis in plain language on a terminal."""
+
+from collections.abc import Mapping
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.padding import Padding
+from rich.table import Column, Table
+
+from irb140_jax.report import text
+from irb140_jax.report.reveal import Reveal
+
+VERDICT_COLOURS = {"no_mismatch": "green", "parameters_only": "green", "physics_left_out": "dark_orange", "unexplained": "red"}
+
+
+def print_diagnosis(diagnosis: Mapping, console: Console) -> None:
+    """Print verdict, findings and fit of a diagnosis."""
+    title, sentence = text.VERDICTS.get(diagnosis["verdict"], (text.words(diagnosis["verdict"]), ""))
+    colour = VERDICT_COLOURS.get(diagnosis["verdict"], "default")
+    joints = list(diagnosis["fit"])
+    console.print()
+    console.print(f"[bold {colour}]{title}.[/] {sentence}")
+    console.print(escape(diagnosis["summary"]))
+    if diagnosis["findings"]:
+        console.print()
+        console.print(_findings(diagnosis["findings"], joints))
+    for finding in diagnosis["findings"]:
+        console.print(f"  {escape(finding['where'])}", style="dim")
+        for other in finding["alternatives"]:
+            name, share = text.words(other["effect"]), text.percent(other["probability"])
+            console.print(f"  It may also be {name} ({share}). To separate them: {escape(other['separate_by'])}")
+    for rest in diagnosis["unexplained"]:
+        names, share = text.joint_list(rest["joints"], joints), text.percent(rest["share"])
+        console.print(f"  [bold]Unexplained[/] on {escape(names)} ({share} of what is left): {escape(rest['where'])}")
+    console.print()
+    console.print(_fit(diagnosis["fit"]))
+    if diagnosis["not_testable"]:
+        names = dict.fromkeys(text.words(blind["effect"]) for blind in diagnosis["not_testable"])
+        console.print(f"This motion could not have shown everywhere: {', '.join(names)}. The report says what would.")
+
+
+def print_reveal(reveal: Reveal, console: Console) -> None:
+    """Print what was hidden beside what was found."""
+    table = Table("hidden", "answer", "parameter", _right("true"), _right("diagnosed"), "unit", box=box.SIMPLE_HEAD)
+    for effect in reveal.found:
+        head = (_named(effect), "[green]found[/]")
+        for name, (true, value, std, unit) in effect["parameters"].items():
+            table.add_row(*head, text.words(name), text.number(true), text.with_std(value, std), unit)
+            head = ("", "")
+    for effect in reveal.missed:
+        table.add_row(_named(effect), "[red]missed[/]")
+    for effect in reveal.extra:
+        table.add_row(_named(effect), "[red]named, but not hidden[/]")
+    if not table.rows:
+        table.add_row("nothing", "[green]nothing named[/]")
+    console.print("[bold]The truth, now revealed[/]")
+    console.print(table)
+
+
+def _findings(findings: list[Mapping], joints: list[str]) -> Padding:
+    """One row per parameter of each finding."""
+    table = Table("left out", "joints", "parameter", _right("value"), "unit", _right("probability"), box=box.SIMPLE_HEAD)
+    for finding in findings:
+        head = [text.words(finding["effect"]), escape(text.joint_list(finding["joints"], joints))]
+        tail = text.percent(finding["evidence"]["probability"])
+        for name, p in finding["parameters"].items():
+            table.add_row(*head, text.words(name), text.with_std(p["value"], p["std"]), p["unit"], tail)
+            head, tail = ["", ""], ""
+    return Padding(table, 0)
+
+
+def _fit(fit: Mapping) -> Table:
+    """Torque error of each model on unseen data."""
+    heads = [_right(name) for name in ("model as given", "refit", "corrected", "noise floor")]
+    table = Table("torque error on unseen data", *heads, box=box.SIMPLE_HEAD)
+    for joint, row in fit.items():
+        keys = ("rmse_nominal", "rmse_refit", "rmse_corrected", "noise_floor")
+        table.add_row(escape(joint), *(text.number(row[key]) for key in keys))
+    return table
+
+
+def _right(header: str) -> Column:
+    """A column of numbers."""
+    return Column(header, justify="right")
+
+
+def _named(effect: Mapping) -> str:
+    """An effect and its joints."""
+    return escape(f"{text.words(effect['effect'])} on {', '.join(effect['joints'])}")

@@ -1,0 +1,155 @@
+"""A made-up diagnosis with everything a report may have to show.  The numbers are invented; only their form matters."""
+
+import numpy as np
+
+JOINTS = tuple(f"joint{i}" for i in range(1, 7))
+
+
+def example_diagnosis() -> dict:
+    """A diagnosis.json with two findings, an alternative, something unexplained and something not testable."""
+    fit = {}
+    for i, name in enumerate(JOINTS):
+        nominal, refit = 9.4 / (1 + i), 6.1 / (1 + i)
+        fit[name] = {
+            "rmse_nominal": nominal,
+            "rmse_refit": refit,
+            "rmse_corrected": 0.5 / (1 + i) + (0.9 if name == "joint5" else 0.0),
+            "noise_floor": None if name == "joint6" else 0.42 / (1 + i),
+        }
+    return {
+        "schema": 1,
+        "verdict": "physics_left_out",
+        "findings": [
+            {
+                "effect": "stribeck_friction",
+                "joints": ["joint2"],
+                "where": "On joint2 whenever it moves, strongest below 0.12 rad/s.",
+                "parameters": {
+                    "coulomb": {"value": 8.4312, "std": 0.0712, "unit": "N m"},
+                    "static": {"value": 12.913, "std": 0.31, "unit": "N m"},
+                    "stribeck_velocity": {"value": 0.1173, "std": 0.0089, "unit": "rad/s"},
+                },
+                "evidence": {"delta_bic": 1843.7, "probability": 0.97, "heldout_gain": 0.88},
+                "alternatives": [
+                    {
+                        "effect": "load_dependent_friction",
+                        "probability": 0.03,
+                        "separate_by": "Move joint2 slowly through the same poses with and without a known mass at the tool.",
+                    }
+                ],
+            },
+            {
+                "effect": "transmission_coupling",
+                "joints": ["joint5", "joint6"],
+                "where": "On joint5 and joint6, in proportion to the difference of their speeds.",
+                "parameters": {"viscous": {"value": 2.31, "std": 0.04, "unit": "N m s/rad"}},
+                "evidence": {"delta_bic": 412.2, "probability": 0.999, "heldout_gain": 0.61},
+                "alternatives": [],
+            },
+        ],
+        "unexplained": [
+            {
+                "joints": ["joint5"],
+                "where": "On joint5 between -0.4 and 0.1 rad, while it moves down.",
+                "share": 0.34,
+                "p_value": 0.0004,
+            }
+        ],
+        "not_testable": [
+            {
+                "effect": "rotor_inertia",
+                "joints": ["joint1", "joint2"],
+                "needs": "Faster reversals: accelerations above 8 rad/s^2 in at least two poses of the arm.",
+            },
+            {"effect": "backlash", "joints": list(JOINTS), "needs": "An encoder on the link side."},
+        ],
+        "fit": fit,
+        "summary": "The model leaves out Stribeck friction on joint2 and a coupling of joint5 and joint6. "
+        "With both, the torque error on unseen data falls from 3.1 to 0.4 N m; on joint5 a third of what is left has a cause "
+        "that the library does not know.",
+    }
+
+
+def example_views() -> dict:
+    """The matching views: maps, traces, ranking, spectra, inertials, notes."""
+    rng = np.random.default_rng(7)
+    q_edges, qd_edges = np.linspace(-1.5, 1.5, 19), np.linspace(-2.0, 2.0, 17)
+    q, qd = (0.5 * (e[1:] + e[:-1]) for e in (q_edges, qd_edges))
+    t = np.arange(0.0, 12.0, 0.02)
+    maps, traces, spectra = {}, {}, {}
+    for i, name in enumerate(JOINTS):
+        size = 8.0 / (1 + i)
+        nominal = size * np.tanh(qd / 0.2)[None, :] + 0.3 * size * np.sin(2 * q)[:, None]
+        corrected = 0.06 * size * rng.standard_normal(nominal.shape)
+        hidden = (q[:, None] / 1.5) ** 2 + (qd[None, :] / 2.0) ** 2 > 1.0
+        blank = lambda grid, hidden=hidden: [  # noqa: E731
+            [None if h else float(v) for v, h in zip(row, hide, strict=True)]
+            for row, hide in zip(grid, hidden, strict=True)
+        ]
+        maps[name] = {
+            "q_edges": q_edges.tolist(),
+            "qd_edges": qd_edges.tolist(),
+            "nominal": blank(nominal),
+            "corrected": blank(corrected),
+            "unit": "N m",
+        }
+        phase = 0.7 * t + 0.4 * i
+        rigid = 4 * size * np.sin(phase) + size * np.sin(2.3 * phase)
+        friction = size * np.tanh(6 * np.cos(phase))
+        noise = 0.08 * size * rng.standard_normal(t.size)
+        traces[name] = {
+            "recording": "wave_3.csv",
+            "t": t.tolist(),
+            "measured": (rigid + friction + noise).tolist(),
+            "nominal": (0.96 * rigid).tolist(),
+            "refit": (1.03 * rigid + 0.2 * size * np.cos(phase)).tolist(),
+            "corrected": (rigid + 0.97 * friction).tolist(),
+        }
+        f = np.geomspace(0.1, 50.0, 60)
+        spectra[name] = {
+            "f": f.tolist(),
+            "nominal": (size / (1 + f)).tolist(),
+            "refit": (0.6 * size / (1 + f)).tolist(),
+            "corrected": (0.05 * size * np.ones_like(f)).tolist(),
+        }
+    return {
+        "joints": list(JOINTS),
+        "recordings": ["wave_1.csv", "wave_2.csv", "wave_3.csv"],
+        "maps": maps,
+        "traces": traces,
+        "ranking": [
+            _ranked("stribeck_friction", ["joint2"], 1843.7, 0.97, True, "alone"),
+            _ranked("coulomb_friction", ["joint2"], 1790.1, 0.0, False, "alone"),
+            _ranked("load_dependent_friction", ["joint2"], 1836.0, 0.03, False, "alone"),
+            _ranked("transmission_coupling", ["joint5", "joint6"], 412.2, 0.999, True, "alone"),
+            _ranked("viscous_friction", ["joint5"], 260.4, 0.0, False, "alone"),
+            _ranked("torque_offset", ["joint3"], -6.1, 0.0, False, "given the others"),
+            _ranked("viscous_friction", ["joint5"], 3.2, 0.01, False, "given the others"),
+        ],
+        "residual_spectrum": spectra,
+        "inertials": [
+            {
+                "link": "link2",
+                "shift_sigma": 2.6,
+                "mass_nominal": 16.06,
+                "mass_refit": 17.31,
+                "sentence": "link2 is 7.8 % heavier than the model says.",
+            }
+        ],
+        "notes": [
+            "wave_2.csv: 14 samples were missing and the gaps were left out.",
+            "Velocities and accelerations come from the positions, smoothed below 12 Hz.",
+        ],
+    }
+
+
+def _ranked(effect: str, joints: list[str], delta_bic: float, probability: float, chosen: bool, stage: str) -> dict:
+    """One row of the ranking."""
+    return {
+        "effect": effect,
+        "joints": joints,
+        "delta_bic": delta_bic,
+        "probability": probability,
+        "chosen": chosen,
+        "stage": stage,
+    }

@@ -1,0 +1,101 @@
+"""Each layer imports only from those above it, read from the source with ast."""
+
+import ast
+import pathlib
+
+import pytest
+
+PACKAGE = pathlib.Path(__file__).parents[1] / "irb140_jax"
+
+# Parts on one line stand beside each other and may not import each other.
+LAYERS = (
+    ("types", "errors", "compilation_cache"),
+    ("robot",),
+    ("trajectory",),
+    ("swarm",),
+    ("kinematics", "oracle"),
+    ("dynamics",),
+    ("control", "effects", "learned"),
+    ("simulate",),
+    ("recordings",),
+    ("mismatch",),
+    ("report",),
+    ("cli",),
+)
+LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}
+
+
+def imported_parts(source: str, module: tuple[str, ...]) -> list[tuple[int, str]]:
+    """Line and part of the package for every import of this source, those inside functions included."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = list(("irb140_jax", *module)[: -node.level]) if node.level else []
+            prefix = ".".join([*base, *([node.module] if node.module else [])])
+            names = [f"{prefix}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        for name in names:
+            head, _, rest = name.partition(".")
+            if head == "irb140_jax" and rest:
+                found.append((node.lineno, rest.split(".")[0]))
+    return found
+
+
+def breaches(source: str, module: tuple[str, ...]) -> list[str]:
+    """Every import of this source that doesn't point upwards, or to a part that has no layer."""
+    part = module[0]
+    if part not in LEVEL:
+        return [f"{part} has no layer; give it one in tests/test_layers.py and CONTRIBUTING.md"]
+    wrong = []
+    for line, target in imported_parts(source, module):
+        if target == part:
+            continue
+        if target not in LEVEL:
+            wrong.append(f"{'.'.join(module)}:{line} imports {target}, which has no layer")
+        elif LEVEL[target] >= LEVEL[part]:
+            wrong.append(f"{'.'.join(module)}:{line} imports {target}, which is not above {part}")
+    return wrong
+
+
+def test_every_module_imports_only_from_layers_above_its_own():
+    modules = [path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py"]
+    assert len(modules) > 10  # the search looked at the package
+    found = []
+    for path in modules:
+        # A package's __init__ keeps its last name: a relative import there starts from the package itself.
+        module = path.relative_to(PACKAGE).with_suffix("").parts
+        found += breaches(path.read_text(encoding="utf-8"), module)
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from irb140_jax.mismatch import diagnose",
+        "import irb140_jax.report.html",
+        "from irb140_jax import cli",
+        "from irb140_jax.control import sliding_mode",
+        "from ..mismatch import diagnose",
+        "def f():\n    from irb140_jax.simulate import rollout",
+        "from irb140_jax.somewhere_new import thing",
+    ],
+)
+def test_a_planted_breach_in_an_effect_is_found(source):
+    assert breaches(source, ("effects", "coulomb_friction"))
+
+
+@pytest.mark.parametrize(
+    "source",
+    ["from irb140_jax.dynamics import regressor", "from irb140_jax.effects.base import Motion", "from . import base", "import jax"],
+)
+def test_an_import_from_above_or_from_the_own_folder_is_no_breach(source):
+    assert not breaches(source, ("effects", "coulomb_friction"))
+
+
+def test_the_mujoco_oracle_shares_no_code_with_what_it_judges():
+    for path in (PACKAGE / "oracle").rglob("*.py"):
+        for line, target in imported_parts(path.read_text(encoding="utf-8"), ("oracle", path.stem)):
+            assert target in ("types", "errors", "robot", "oracle"), f"{path.name}:{line} imports {target}"

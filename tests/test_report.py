@@ -1,0 +1,215 @@
+"""The report shows everything that the diagnosis holds, in one file that needs no network."""
+
+import copy
+import html.parser
+import io
+import re
+import time
+
+import helpers_report
+import pytest
+from rich.console import Console
+
+from irb140_jax.report import html_report, print_diagnosis, print_reveal, revealed
+from irb140_jax.report import svg, text
+
+VOID = {"meta", "br", "img", "hr", "input", "link", "rect", "path"}
+
+
+class Page(html.parser.HTMLParser):
+    """Visible words of a page, and what is wrong with its nesting."""
+
+    def __init__(self, source: str):
+        super().__init__()
+        self.words, self.open, self.wrong, self.attributes = [], [], [], []
+        self.feed(source)
+        self.visible = re.sub(r"\s+", " ", " ".join(self.words))
+
+    def handle_starttag(self, tag, attrs):
+        self.attributes += [(tag, name, value) for name, value in attrs]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag in VOID:
+            return
+        if not self.open or self.open.pop() != tag:
+            self.wrong.append(tag)
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ("style", "script"):
+            self.words.append(data)
+
+
+@pytest.fixture(scope="module")
+def diagnosis() -> dict:
+    return helpers_report.example_diagnosis()
+
+
+@pytest.fixture(scope="module")
+def views() -> dict:
+    return helpers_report.example_views()
+
+
+@pytest.fixture(scope="module")
+def page(diagnosis, views) -> Page:
+    return Page(html_report(diagnosis, views))
+
+
+def printed(diagnosis) -> str:
+    """What the terminal would show, with white space made even."""
+    console = Console(file=io.StringIO(), width=160)
+    print_diagnosis(diagnosis, console)
+    return re.sub(r"\s+", " ", console.file.getvalue())  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_every_finding_is_in_the_report_with_its_parameters_units_and_alternatives(diagnosis, page):
+    for finding in diagnosis["findings"]:
+        assert text.words(finding["effect"]).capitalize() in page.visible
+        assert finding["where"] in page.visible
+        for name, p in finding["parameters"].items():
+            row = f"{text.words(name)} {text.with_std(p['value'], p['std'])} {text.interval_90(p['value'], p['std'])} {p['unit']}"
+            assert row in page.visible
+        for other in finding["alternatives"]:
+            assert other["separate_by"] in page.visible
+
+
+def test_what_is_unexplained_or_not_testable_is_in_the_report(diagnosis, page):
+    for rest in diagnosis["unexplained"]:
+        assert rest["where"] in page.visible
+    for blind in diagnosis["not_testable"]:
+        assert blind["needs"] in page.visible
+
+
+def test_every_joint_has_its_row_of_errors_its_maps_and_its_torque(diagnosis, views, page):
+    for joint, row in diagnosis["fit"].items():
+        numbers = " ".join(text.number(row[k]) for k in ("rmse_nominal", "rmse_refit", "rmse_corrected", "noise_floor"))
+        assert f"{joint} {numbers}" in page.visible
+        assert f"{joint}, {views['traces'][joint]['recording']}" in page.visible
+    assert page.visible.count("position [rad]") == 2 * len(views["joints"])
+
+
+def test_notes_and_inertials_are_in_the_report(views, page):
+    for sentence in [*views["notes"], *(link["sentence"] for link in views["inertials"])]:
+        assert sentence in page.visible
+
+
+def test_the_report_is_well_formed_and_loads_nothing_from_elsewhere(diagnosis, views, page):
+    source = html_report(diagnosis, views)
+    assert not page.wrong and not page.open
+    assert "//" not in re.sub(r"<!--.*?-->", "", source), "an address"
+    assert "url(" not in source and "@import" not in source
+    assert not [a for a in page.attributes if a[1] in ("src", "href", "srcset", "data", "action")]
+    assert "<script" not in source
+
+
+def test_no_drawing_holds_a_number_that_is_none(diagnosis, views):
+    source = html_report(diagnosis, views)
+    assert not re.search(r"\b(nan|inf|None)\b", Page(source).visible)
+    assert not re.search(r'd="[^"]*(nan|inf)', source)
+
+
+def test_names_from_files_cannot_inject_markup(diagnosis, views):
+    evil = copy.deepcopy(views)
+    evil["recordings"] = ["<b onload=x>.csv"]
+    evil["notes"] = ["<script>alert(1)</script>"]
+    source = html_report(diagnosis, evil)
+    assert "<script" not in source and "<b onload" not in source
+
+
+def test_the_report_is_made_within_its_time(diagnosis, views):
+    start = time.perf_counter()
+    html_report(diagnosis, views)
+    assert time.perf_counter() - start < 1.5  # [s]; the budget of the report, about ten times what it takes
+
+
+def test_a_diagnosis_without_findings_or_views_has_a_report_too(diagnosis, views):
+    clean = diagnosis | {"verdict": "no_mismatch", "findings": [], "unexplained": [], "not_testable": []}
+    bare = {"joints": views["joints"], "recordings": ["a.csv"]}
+    page = Page(html_report(clean, bare))
+    assert "No mismatch" in page.visible and "Nothing that these recordings could show" in page.visible
+    assert not page.wrong
+
+
+@pytest.mark.parametrize("verdict", ["no_mismatch", "parameters_only", "physics_left_out", "unexplained"])
+def test_every_verdict_has_its_sentence_in_the_report_and_on_the_terminal(diagnosis, views, verdict):
+    title, sentence = text.VERDICTS[verdict]
+    judged = diagnosis | {"verdict": verdict}
+    assert f"{title} {sentence}" in Page(html_report(judged, views)).visible
+    assert f"{title}. {sentence}" in printed(judged)
+
+
+def test_the_terminal_names_every_finding_with_value_and_unit(diagnosis):
+    shown = printed(diagnosis)
+    for finding in diagnosis["findings"]:
+        assert f"{text.words(finding['effect'])} {text.joint_list(finding['joints'])}" in shown
+        for name, p in finding["parameters"].items():
+            assert f"{text.words(name)} {text.with_std(p['value'], p['std'])} {p['unit']}" in shown
+
+
+def test_the_truth_is_sorted_into_found_missed_and_extra(diagnosis):
+    hidden = [
+        {"effect": "transmission_coupling", "joints": ["joint6", "joint5"], "parameters": {"viscous": {"value": 2.3, "unit": "-"}}},
+        {"effect": "stribeck_friction", "joints": ["joint3"], "parameters": {}},
+    ]
+    reveal = revealed(hidden, diagnosis, "seal")
+    assert [effect["effect"] for effect in reveal.found] == ["transmission_coupling"]
+    assert reveal.found[0]["parameters"]["viscous"] == (2.3, 2.31, 0.04, "N m s/rad")
+    assert [effect["joints"] for effect in reveal.missed] == [["joint3"]]
+    assert [effect["joints"] for effect in reveal.extra] == [["joint2"]]
+    assert not reveal.right
+
+
+def test_the_revealed_truth_is_shown_on_the_terminal_and_in_the_report(diagnosis, views):
+    reveal = revealed([{"effect": "backlash", "joints": ["joint4"], "parameters": {}}], diagnosis, "abc123")
+    console = Console(file=io.StringIO(), width=160)
+    print_reveal(reveal, console)
+    shown = console.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
+    page = Page(html_report(diagnosis, views, reveal))
+    for place in (shown, page.visible):
+        assert "backlash" in place and "missed" in place and "named, but not hidden" in place
+    assert "abc123" in page.visible
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "shown"),
+    [
+        (8.4312, 0.0712, "8.431 ± 0.071"),
+        (12345.6, 120.0, "12350 ± 120"),
+        (-0.5, 0.25, "−0.50 ± 0.25"),
+        (2.0, None, "2.000"),
+        (1.5, 0.0, "1.500 ± 0"),
+    ],
+)
+def test_a_value_is_shown_to_the_digits_its_uncertainty_makes_worth_reading(value, std, shown):
+    assert text.with_std(value, std) == shown
+
+
+def test_the_90_percent_interval_is_that_of_a_normal_distribution():
+    # 1.6449 standard deviations hold 90 % of a normal distribution.
+    assert text.interval_90(10.0, 1.0) == "8.4 to 11.6"
+
+
+def test_a_share_is_never_rounded_up_to_certainty():
+    assert text.percent(0.99999) == "> 99.9 %"
+    assert text.percent(1.0) == "100 %"
+    assert text.percent(0.00001) == "< 0.1 %"
+
+
+@pytest.mark.parametrize(("low", "high"), [(-2.0, 2.0), (0.0, 0.013), (-1e-7, 3e-7), (99.0, 101.0), (-1234.0, 88.0)])
+def test_ticks_are_a_handful_of_places_inside_the_range(low, high):
+    places = svg.ticks(low, high)
+    slack = 1e-9 * (high - low)
+    assert 3 <= len(places) <= 9
+    assert all(low - slack <= place <= high + slack for place in places)
+
+
+def test_the_heat_map_is_blue_below_orange_above_and_empty_where_there_are_no_data():
+    drawn = svg.heat_map("m", [[-1.0, 1.0], [None, 0.0]], [0, 1, 2], [0, 1, 2], 1.0, "rad")
+    assert [fill for fill in re.findall(r'<path fill="(#\w+)"', drawn)] == [svg.shade(-1), svg.shade(0), svg.shade(1)]
+    assert drawn.count("z") == 3  # cells
+
+
+def test_a_line_is_broken_where_a_value_is_missing():
+    drawn = svg.line_plot([0, 1, 2, 3, 4], [svg.Series("s", [0.0, 1.0, None, 1.0, 0.0], "#000")], "t", "y")
+    assert re.search(r'class="line"[^>]* d="M[\d. ]+L[\d. ]+M[\d. ]+L[\d. ]+"', drawn)
