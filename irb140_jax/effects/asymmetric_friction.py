@@ -1,0 +1,43 @@
+"""Asymmetric friction: another level of dry friction in each direction."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+
+
+class AsymmetricFriction(AbstractEffect):
+    """tau = Fc+ for qd > 0, -Fc- for qd < 0."""
+
+    slug = "asymmetric_friction"
+    title = "friction that differs by direction"
+    equation = "Fc+ for qd > 0, -Fc- for qd < 0"
+    source = "Armstrong-Helouvry, Control of Machines with Friction, 1991, ch. 2"
+    parameters = (Parameter("coulomb_pos", "{tau}", low=0.0), Parameter("coulomb_neg", "{tau}", low=0.0))
+    contains = ("coulomb_friction",)
+    variants = ((0, 1),)
+    confused_with = {
+        "torque_offset": "dwells: an offset stays at rest, friction does not",
+        "coulomb_friction": "the same stretch in both directions, with dwells in the same posture",
+    }
+    needs = "motion in both directions"
+    dissipative = True
+
+    def columns(self, motion, joints, shape):
+        s = of_site(motion.direction(), joints)
+        return jnp.stack([jnp.maximum(s, 0.0), jnp.minimum(s, 0.0)], axis=-1)
+
+    def physical(self, w, shape):
+        return w
+
+    def amplitudes(self, values):
+        return np.array([values["coulomb_pos"], values["coulomb_neg"]]), np.zeros(0)
+
+    def lowest(self, robot, joints):
+        return -np.repeat(np.asarray(robot.frictionloss)[joints], 2)
+
+    def where(self, names, values, unit):
+        return (
+            f"{names}: {values['coulomb_pos']:.3g} {unit} while moving up, {values['coulomb_neg']:.3g} {unit} "
+            "while moving down"
+        )

@@ -1,0 +1,136 @@
+"""What every left-out effect is: torque along a motion, linear in amplitudes w, nonlinear in a few shape parameters s.
+
+    tau_effect(t) = Phi(q, qd, qdd, load, t; s) w
+
+One file of this folder holds one effect; `catalogue.py` finds it there.  From that file come the screen, the fit, the
+report, the corrected model, the docs table and the contract tests.
+"""
+
+import abc
+from typing import ClassVar, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from irb140_jax.robot import Robot
+from irb140_jax.types import Joints, JointSamples, Samples
+
+
+class Motion(eqx.Module):
+    """What an effect may look at: a motion and the torque the model transmits along it.
+
+    Attributes:
+        t: Time [s], shape (T,).
+        q, qd, qdd: Joint positions, velocities, accelerations, shape (T, n).
+        load: Torque of the model along the motion [N m or N], shape (T, n).
+        rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
+    """
+
+    t: Samples
+    q: JointSamples
+    qd: JointSamples
+    qdd: JointSamples
+    load: JointSamples
+    rest_speed: Joints
+
+    def direction(self) -> JointSamples:
+        """sign(qd), rounded off where encoder noise hides the sign, shape (T, n)."""
+        return jnp.tanh(self.qd / self.rest_speed)
+
+
+class Scales(NamedTuple):
+    """Sizes of a set of recordings, for grids of shape parameters; each of shape (n,)."""
+
+    speed: np.ndarray  # largest speed of each joint [rad/s or m/s]
+    rest_speed: np.ndarray  # speed the encoders can't tell from rest
+    torque: np.ndarray  # RMS of the logged torque [N m or N]
+
+
+class Parameter(NamedTuple):
+    """Name, unit and admissible range of a physical parameter; {tau} and {q} in the unit stand for N m, rad or N, m."""
+
+    name: str
+    unit: str
+    low: float = -np.inf
+    high: float = np.inf
+
+
+class AbstractEffect(abc.ABC):
+    """A kind of left-out physics.  Subclasses are final, hold no state, and are listed by the catalogue.
+
+    Class attributes:
+        slug: Name in the vocabulary; never changes meaning.
+        title: A few words for a person.
+        equation, source: The law and where it comes from.
+        parameters: Physical parameters, in the order that `physical` returns them.
+        contains: Slugs of effects that are special cases of this one (they compete, never stand side by side).
+        variants: Subsets of the columns that make sense by themselves.
+        confused_with: Slug of a look-alike -> the motion which separates the two.
+        needs: The motion that would show the effect.
+        dissipative: It can only take energy out of the arm.
+        mjcf: How MJCF expresses it, or None.
+    """
+
+    slug: ClassVar[str]
+    title: ClassVar[str]
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+    contains: ClassVar[tuple[str, ...]] = ()
+    variants: ClassVar[tuple[tuple[int, ...], ...]]
+    confused_with: ClassVar[dict[str, str]] = {}
+    needs: ClassVar[str]
+    dissipative: ClassVar[bool] = False
+    mjcf: ClassVar[str | None] = None
+
+    def sites(self, robot: Robot) -> np.ndarray:
+        """Groups of joints at which the effect can act, shape (sites, joints per site); by default each joint alone."""
+        return np.arange(robot.n)[:, None]
+
+    def shapes(self, scales: Scales, joints: np.ndarray) -> np.ndarray:
+        """Grid of shape parameters to search at this site, shape (grid points, shape parameters)."""
+        del scales, joints
+        return np.zeros((1, 0))
+
+    def refines(self) -> bool:
+        """Whether the shape is continuous, so that the best grid point should be refined."""
+        return False
+
+    @abc.abstractmethod
+    def columns(
+        self, motion: Motion, joints: Int[Array, " m"], shape: Float[Array, " s"]
+    ) -> Float[Array, "T m k"]:
+        """Torque on each joint of the site per unit of each amplitude, shape (T, joints of the site, amplitudes)."""
+
+    @abc.abstractmethod
+    def physical(self, w: Float[Array, " k"], shape: Float[Array, " s"]) -> Float[Array, " p"]:
+        """Physical parameters, in the order of `parameters`, from amplitudes and shape."""
+
+    @abc.abstractmethod
+    def amplitudes(self, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes (all columns) and shape from physical parameters; the inverse of `physical`."""
+
+    def lowest(self, robot: Robot, joints: np.ndarray) -> np.ndarray:
+        """Smallest admissible amplitude of each column: what the model already has may be taken away, no more."""
+        del robot, joints
+        return np.full(max(max(v) for v in self.variants) + 1, -np.inf)
+
+    @abc.abstractmethod
+    def where(self, names: str, values: dict[str, float], unit: str) -> str:
+        """One sentence: at which positions, speeds, loads, times or frequencies it acts."""
+
+    def unit(self, parameter: Parameter, is_slide: bool) -> str:
+        """The parameter's unit for a hinge or a slide."""
+        return parameter.unit.format(tau="N" if is_slide else "N m", q="m" if is_slide else "rad")
+
+
+def of_site(array: JointSamples, joints: Int[Array, " m"]) -> Float[Array, "T m"]:
+    """The columns of a (T, n) array that belong to the joints of a site."""
+    return jnp.take(array, joints, axis=1)
+
+
+def geometric_grid(low: float, high: float, points: int) -> np.ndarray:
+    """Grid of one shape parameter, equal ratios from low to high, shape (points, 1)."""
+    return np.geomspace(low, max(high, low * 1.001), points)[:, None]

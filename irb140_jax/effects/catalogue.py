@@ -1,0 +1,25 @@
+"""The catalogue: every final effect class found in the files of this folder."""
+
+import importlib
+import pkgutil
+
+from irb140_jax import effects
+from irb140_jax.effects.base import AbstractEffect
+
+
+def _found() -> dict[str, AbstractEffect]:
+    catalogue: dict[str, AbstractEffect] = {}
+    for module in sorted(pkgutil.iter_modules(effects.__path__), key=lambda m: m.name):
+        if module.name == "catalogue":
+            continue
+        for value in vars(importlib.import_module(f"{effects.__name__}.{module.name}")).values():
+            is_effect = isinstance(value, type) and issubclass(value, AbstractEffect) and value is not AbstractEffect
+            if not is_effect or value.__module__ != f"{effects.__name__}.{module.name}":
+                continue
+            if value.slug in catalogue:
+                raise TypeError(f"two effects share the slug {value.slug!r}: {catalogue[value.slug]} and {value}")
+            catalogue[value.slug] = value()
+    return catalogue
+
+
+CATALOGUE = _found()

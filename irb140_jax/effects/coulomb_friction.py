@@ -1,0 +1,46 @@
+"""Coulomb friction: a torque of constant size against the motion."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+
+
+class CoulombFriction(AbstractEffect):
+    """tau = Fc sign(qd)."""
+
+    slug = "coulomb_friction"
+    title = "Coulomb friction"
+    equation = "Fc sign(qd)"
+    source = "C. A. Coulomb, Theorie des machines simples, 1785; Armstrong-Helouvry et al., Automatica 30(7), 1994"
+    parameters = (Parameter("coulomb", "{tau}", low=0.0),)
+    variants = ((0,),)
+    confused_with = {
+        "stribeck_friction": "a ladder of constant speeds from very slow to fast, both ways",
+        "load_dependent_friction": "the same speeds at several gravity loads or payloads",
+        "asymmetric_friction": "the same stretch in both directions, with dwells in the same posture",
+        "viscous_friction": "the same move at two speeds",
+    }
+    needs = "motion that reverses direction"
+    dissipative = True
+    mjcf = "joint frictionloss"
+
+    def columns(self, motion, joints, shape):
+        return of_site(motion.direction(), joints)[:, :, None]
+
+    def physical(self, w, shape):
+        return w
+
+    def amplitudes(self, values):
+        return np.array([values["coulomb"]]), np.zeros(0)
+
+    def lowest(self, robot, joints):
+        return -np.asarray(robot.frictionloss)[joints]
+
+    def where(self, names, values, unit):
+        return f"{names}: a step of +-{values['coulomb']:.3g} {unit} at every reversal of the motion, whatever the speed"
+
+
+def dry_friction_columns(motion, joints, second):
+    """Columns [sign(qd), second], the shape shared by friction laws that refine Coulomb's, (T, m, 2)."""
+    return jnp.stack([of_site(motion.direction(), joints), second], axis=-1)

@@ -1,0 +1,45 @@
+"""Load-dependent friction: a gear that rubs harder the more torque it transmits."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.coulomb_friction import dry_friction_columns
+
+
+class LoadDependentFriction(AbstractEffect):
+    """tau = (Fc + mu |transmitted torque|) sign(qd)."""
+
+    slug = "load_dependent_friction"
+    title = "friction that grows with load"
+    equation = "(Fc + mu |load|) sign(qd)"
+    source = "Hamon, Gautier, Garrec, IROS 2010; Duclusaud et al., arXiv 2410.08650"
+    parameters = (Parameter("load_coefficient", "1", low=0.0), Parameter("coulomb", "{tau}", low=0.0))
+    contains = ("coulomb_friction",)
+    variants = ((0, 1),)
+    confused_with = {
+        "coulomb_friction": "the same speed at several gravity loads or payloads",
+        "position_dependent_friction": "the same positions with another payload",
+        "torque_gain": "the same loads while standing still",
+    }
+    needs = "motion in both directions under clearly different loads"
+    dissipative = True
+
+    def columns(self, motion, joints, shape):
+        load = jnp.abs(of_site(motion.load, joints))
+        return dry_friction_columns(motion, joints, load * of_site(motion.direction(), joints))
+
+    def physical(self, w, shape):
+        return jnp.stack([w[1], w[0]])
+
+    def amplitudes(self, values):
+        return np.array([values["coulomb"], values["load_coefficient"]]), np.zeros(0)
+
+    def lowest(self, robot, joints):
+        return np.array([-float(robot.frictionloss[joints[0]]), 0.0])
+
+    def where(self, names, values, unit):
+        return (
+            f"{names}: against the motion, {100 * values['load_coefficient']:.3g} % of the transmitted torque "
+            f"on top of {values['coulomb']:.3g}"
+        )

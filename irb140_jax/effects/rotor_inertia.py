@@ -1,0 +1,37 @@
+"""Rotor inertia: the motor's own inertia, seen through the gear squared."""
+
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+
+
+class RotorInertia(AbstractEffect):
+    """tau = J qdd, J on the joint side."""
+
+    slug = "rotor_inertia"
+    title = "rotor inertia"
+    equation = "J qdd"
+    source = "Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, ch. 9"
+    parameters = (Parameter("inertia", "{tau} s^2/{q}", low=0.0),)
+    variants = ((0,),)
+    confused_with = {
+        "joint_elasticity": "a chirp through the first resonance",
+        "actuator_lag": "a friction reversal at several accelerations: a lag shifts it in time",
+    }
+    needs = "high acceleration of the joint, with the joints before it moving too"
+    mjcf = "joint armature"
+
+    def columns(self, motion, joints, shape):
+        return of_site(motion.qdd, joints)[:, :, None]
+
+    def physical(self, w, shape):
+        return w
+
+    def amplitudes(self, values):
+        return np.array([values["inertia"]]), np.zeros(0)
+
+    def lowest(self, robot, joints):
+        return -np.asarray(robot.armature)[joints]
+
+    def where(self, names, values, unit):
+        return f"{names}: in proportion to the joint's own acceleration, {values['inertia']:.3g} {unit}"

@@ -1,0 +1,57 @@
+"""Stribeck friction: dry friction that is higher at very low speed."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, geometric_grid, of_site
+from irb140_jax.effects.coulomb_friction import dry_friction_columns
+
+
+class StribeckFriction(AbstractEffect):
+    """tau = (Fc + (Fs - Fc) exp(-(qd/vs)^2)) sign(qd)."""
+
+    slug = "stribeck_friction"
+    title = "Stribeck friction"
+    equation = "(Fc + (Fs - Fc) exp(-(qd/vs)^2)) sign(qd)"
+    source = "R. Stribeck, VDI-Zeitschrift 46, 1902; Armstrong-Helouvry et al., Automatica 30(7), 1994"
+    parameters = (
+        Parameter("coulomb", "{tau}", low=0.0),
+        Parameter("static", "{tau}", low=0.0),
+        Parameter("stribeck_velocity", "{q}/s", low=0.0),
+    )
+    contains = ("coulomb_friction",)
+    variants = ((0, 1),)
+    confused_with = {
+        "coulomb_friction": "a ladder of constant speeds from very slow to fast, both ways",
+        "nonlinear_viscous_friction": "constant speeds in the upper half of the speed range",
+        "presliding_hysteresis": "micro-motion: presliding is springy before slip",
+    }
+    needs = "slow motion: constant speeds below and above the Stribeck speed"
+    dissipative = True
+
+    def shapes(self, scales, joints):
+        j = joints[0]
+        return geometric_grid(max(2.0 * scales.rest_speed[j], 0.003 * scales.speed[j]), 0.5 * scales.speed[j], 12)
+
+    def refines(self):
+        return True
+
+    def columns(self, motion, joints, shape):
+        s = of_site(motion.direction(), joints)
+        return dry_friction_columns(motion, joints, jnp.exp(-((of_site(motion.qd, joints) / shape[0]) ** 2)) * s)
+
+    def physical(self, w, shape):
+        return jnp.stack([w[0], w[0] + w[1], shape[0]])
+
+    def amplitudes(self, values):
+        coulomb, static = values["coulomb"], values["static"]
+        return np.array([coulomb, static - coulomb]), np.array([values["stribeck_velocity"]])
+
+    def lowest(self, robot, joints):
+        return np.array([-float(robot.frictionloss[joints[0]]), 0.0])
+
+    def where(self, names, values, unit):
+        return (
+            f"{names}: below about {values['stribeck_velocity']:.3g} {unit.split()[-1]} "
+            f"friction rises from {values['coulomb']:.3g} to {values['static']:.3g}"
+        )

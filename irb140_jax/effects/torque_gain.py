@@ -1,0 +1,37 @@
+"""Torque gain: the drive's torque constant is not what the log assumes."""
+
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+
+
+class TorqueGain(AbstractEffect):
+    """real torque = gain x logged torque, so the log holds (1/gain - 1) x real torque beyond the model."""
+
+    slug = "torque_gain"
+    title = "wrong torque constant"
+    equation = "(1/gain - 1) tau_model"
+    source = "Gautier and Briot, Global identification of joint drive gains, JMR 6(2), 2014"
+    parameters = (Parameter("gain", "1", low=0.0),)
+    variants = ((0,),)
+    confused_with = {
+        "payload": "a known payload, on and off",
+        "rotor_inertia": "postures under gravity: a gain scales them, a rotor doesn't",
+        "load_dependent_friction": "the same loads while standing still",
+    }
+    needs = "large gravity torque on this joint that other joints' torques confirm, or a known payload"
+
+    def columns(self, motion, joints, shape):
+        return of_site(motion.load, joints)[:, :, None]
+
+    def physical(self, w, shape):
+        return 1.0 / (1.0 + w)
+
+    def amplitudes(self, values):
+        return np.array([1.0 / values["gain"] - 1.0]), np.zeros(0)
+
+    def lowest(self, robot, joints):
+        return np.full(1, -0.9)
+
+    def where(self, names, values, unit):
+        return f"{names}: in proportion to the joint's whole torque; the real torque is {values['gain']:.3g} x the logged"

@@ -1,0 +1,35 @@
+"""Torque offset: a constant torque, from current sensors, amplifiers or a spring preload."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+
+
+class TorqueOffset(AbstractEffect):
+    """tau = constant."""
+
+    slug = "torque_offset"
+    title = "constant torque offset"
+    equation = "tau0"
+    source = "Swevers, Verdonck, De Schutter, IEEE Control Systems 27(5), 2007"
+    parameters = (Parameter("offset", "{tau}"),)
+    variants = ((0,),)
+    confused_with = {
+        "encoder_offset": "postures in which the slope of gravity changes sign",
+        "gravity_spring": "the whole range of the joint",
+        "asymmetric_friction": "dwells: an offset stays at rest, friction does not",
+    }
+    needs = "postures with clearly different gravity torque"
+
+    def columns(self, motion, joints, shape):
+        return jnp.ones_like(of_site(motion.q, joints))[:, :, None]
+
+    def physical(self, w, shape):
+        return w
+
+    def amplitudes(self, values):
+        return np.array([values["offset"]]), np.zeros(0)
+
+    def where(self, names, values, unit):
+        return f"{names}: {values['offset']:.3g} {unit} at all positions, speeds and times"

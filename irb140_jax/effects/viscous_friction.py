@@ -1,0 +1,39 @@
+"""Viscous friction: a torque against the motion that grows with speed."""
+
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+
+
+class ViscousFriction(AbstractEffect):
+    """tau = Fv qd."""
+
+    slug = "viscous_friction"
+    title = "viscous friction"
+    equation = "Fv qd"
+    source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994"
+    parameters = (Parameter("viscous", "{tau} s/{q}", low=0.0),)
+    variants = ((0,),)
+    confused_with = {
+        "coulomb_friction": "the same move at two speeds",
+        "time_delay": "two excitation frequencies: the phase of a delay grows with frequency",
+        "transmission_coupling": "move each of the two joints with the other at rest",
+    }
+    needs = "motion at clearly different speeds"
+    dissipative = True
+    mjcf = "joint damping"
+
+    def columns(self, motion, joints, shape):
+        return of_site(motion.qd, joints)[:, :, None]
+
+    def physical(self, w, shape):
+        return w
+
+    def amplitudes(self, values):
+        return np.array([values["viscous"]]), np.zeros(0)
+
+    def lowest(self, robot, joints):
+        return -np.asarray(robot.damping)[joints]
+
+    def where(self, names, values, unit):
+        return f"{names}: in proportion to speed, {values['viscous']:.3g} {unit}, so mostly in the fast stretches"

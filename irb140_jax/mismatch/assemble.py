@@ -1,0 +1,137 @@
+"""From conditioned recordings to a search problem: columns, prior scales, noise, Gram matrices."""
+
+import dataclasses
+
+import numpy as np
+
+from irb140_jax.effects import AbstractEffect
+from irb140_jax.mismatch.candidates import Candidate, Library, Stretch
+from irb140_jax.mismatch.evidence import Grams, eliminated, grams
+from irb140_jax.mismatch.name import Problem
+from irb140_jax.mismatch.noise import Noise, noise_from_residuals
+from irb140_jax.robot import Robot
+
+TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a share of the joint's torque
+LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
+LOOSE_PRIOR = np.log(0.2)  # such a link is rarer than a left-out effect
+BLOCKS = 5  # contiguous blocks per recording: for jackknife intervals, and folds where there is one recording
+
+
+class LooseInertials(AbstractEffect):
+    """Not left-out physics: a link whose inertials are wrong beyond the stated uncertainty, competing with physics."""
+
+    slug = "inertials"
+    title = "inertials wrong beyond their stated uncertainty"
+    equation = "Y_link (phi - phi_nominal)"
+    source = "prior of `inertial_prior_factor`, widened"
+    parameters = ()
+    variants = (tuple(range(10)),)
+    needs = "motion of this joint and the joints before it"
+
+    def columns(self, motion, joints, shape):
+        raise NotImplementedError("these columns are the regressor's")
+
+    def physical(self, w, shape):
+        return w[:0]
+
+    def amplitudes(self, values):
+        raise NotImplementedError("inertials have no amplitudes of their own")
+
+    def where(self, names, values, unit):
+        return f"{names}: in the rigid body's own torques"
+
+
+@dataclasses.dataclass(frozen=True)
+class Data:
+    """Low-passed rows of all recordings with columns [inertials | amplitudes | loose inertials].
+
+    Attributes:
+        stretches: One per recording.
+        scale: Prior standard deviation of each column's coefficient, shape (K,).
+        candidates: Library candidates followed by one loose-inertials candidate per link.
+        nuisances: Number of inertial columns (10 n).
+    """
+
+    stretches: list[Stretch]
+    scale: np.ndarray
+    candidates: tuple[Candidate, ...]
+    nuisances: int
+
+
+def assemble(lib: Library, stretches: list[Stretch], factor: np.ndarray, uncertainty: float) -> Data:
+    """Put inertials into prior units, append the loose ones and set the prior scale of every amplitude.
+
+    Args:
+        lib: The candidates.
+        stretches: Rows with columns [regressor | amplitudes].
+        factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
+        uncertainty: Stated relative standard deviation of the inertials.
+    """
+    nuisances = len(factor)
+    out = []
+    for s in stretches:
+        theta = s.X[..., :nuisances] @ factor
+        out.append(dataclasses.replace(s, X=np.concatenate([theta, s.X[..., nuisances:], theta], axis=-1)))
+    torque = np.sqrt(np.mean(np.concatenate([s.tau for s in out]) ** 2, axis=0))
+    rms = np.sqrt(np.mean(np.concatenate([s.X[..., nuisances : nuisances + lib.size] for s in out]) ** 2, axis=0))
+    with np.errstate(divide="ignore"):
+        typical = np.min(np.where(rms > 0, TYPICAL_SHARE * torque[:, None] / np.where(rms > 0, rms, 1), np.inf), axis=0)
+    typical[~np.isfinite(typical)] = 0.0
+    scale = np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
+    loose = LooseInertials()
+    extra = [
+        Candidate(loose, (k,), np.zeros(0), lib.size + 10 * k + np.arange(10), tuple(range(10)), np.full(10, -np.inf))
+        for k in range(lib.robot.n)
+    ]
+    return Data(out, scale, (*lib.candidates, *extra), nuisances)
+
+
+def problem(data: Data, noise: Noise) -> tuple[Problem, Grams]:
+    """Gram matrices under a noise model, ready for the search."""
+    g = grams(data.stretches, noise, data.scale, data.nuisances, BLOCKS)
+    H, _ = eliminated(g.total(), np.arange(data.nuisances))
+    sites = len({(c.slug, c.joints) for c in data.candidates})
+    shapes: dict[tuple[str, tuple[int, ...]], int] = {}
+    for c in data.candidates:
+        shapes[c.slug, c.joints] = shapes.get((c.slug, c.joints), 0) + 1
+    log_prior = np.array([
+        -np.log(sites) - np.log(shapes[c.slug, c.joints]) + (LOOSE_PRIOR if c.slug == "inertials" else 0.0)
+        for c in data.candidates
+    ])  # fmt: skip
+    width = max(len(c.columns) for c in data.candidates)
+    lowest = np.full((len(data.candidates), width), -np.inf)
+    for i, c in enumerate(data.candidates):
+        s = data.scale[data.nuisances + c.columns]
+        lowest[i, : len(c.columns)] = c.lowest / np.where(s > 0, s, 1.0)
+    energy = np.zeros(g.rows.shape[1])
+    for r, s in enumerate(data.stretches):
+        for j in range(len(energy)):
+            white = noise.whitened(s.nominal[:, j], j, r)
+            energy[j] += np.sum(white[Noise.usable(s.use[:, j])] ** 2)
+    return Problem(H, g.per_joint, energy, data.candidates, data.nuisances, log_prior, lowest), g
+
+
+def first_noise(data: Data) -> Noise:
+    """Noise left when every column of the library may help: no larger for what the model leaves out."""
+    n = data.stretches[0].y.shape[1]
+    use = [s.use for s in data.stretches]
+    residuals = [np.zeros_like(s.y) for s in data.stretches]
+    dof = np.zeros(n)
+    for j in range(n):
+        keep = data.scale > 0
+        A = np.concatenate([s.X[s.use[:, j], j][:, keep] * data.scale[keep] for s in data.stretches])
+        y = np.concatenate([s.y[s.use[:, j], j] for s in data.stretches])
+        if len(y) < 10:
+            continue
+        values, vectors = np.linalg.eigh(A.T @ A)
+        values, projected = np.clip(values, 0, None), vectors.T @ (A.T @ y)
+        variance = float(np.mean(y**2)) * 0.1 + 1e-18
+        for _ in range(10):
+            w = projected / (values + variance)
+            rss = y @ y - 2 * w @ projected + (w**2) @ values
+            dof[j] = np.sum(values / (values + variance))
+            variance = max(rss, 1e-18 * (y @ y)) / max(len(y) - dof[j], 0.2 * len(y)) + 1e-24
+        v = vectors @ (projected / (values + variance))
+        for s, r in zip(data.stretches, residuals, strict=True):
+            r[:, j] = s.y[:, j] - s.X[:, j][:, keep] @ (v * data.scale[keep])
+    return noise_from_residuals(residuals, use, dof)

@@ -1,0 +1,127 @@
+"""One Gram matrix: the evidence of any set of explanations without touching the data again.
+
+With whitened rows y = X w + e, e ~ N(0, 1) and amplitudes w = W v, v ~ N(0, 1),
+
+    log evidence(S) = 1/2 b' M^-1 b - 1/2 log det M,   M = 1 + W X'X W,  b = W X'y,
+
+up to a constant that all sets share.  Inertial parameters are always in; they are eliminated once.
+"""
+
+import dataclasses
+
+import numpy as np
+from scipy import linalg
+
+from irb140_jax.mismatch.candidates import Candidate, Stretch
+from irb140_jax.mismatch.noise import Noise
+
+
+@dataclasses.dataclass(frozen=True)
+class Grams:
+    """Whitened Gram matrices [X | y]'[X | y] of blocks of the data, columns scaled by their prior standard deviation.
+
+    Attributes:
+        blocks: Shape (blocks, K + 1, K + 1).
+        recording: Recording of each block, shape (blocks,).
+        rows: Whitened rows of each block and joint, shape (blocks, n).
+        per_joint: The same for each joint's rows over all blocks, shape (n, K + 1, K + 1).
+        nuisances: The first so many columns are the inertial parameters.
+    """
+
+    blocks: np.ndarray
+    per_joint: np.ndarray
+    recording: np.ndarray
+    rows: np.ndarray
+    nuisances: int
+
+    def total(self, without: np.ndarray | None = None) -> np.ndarray:
+        """Sum over blocks, leaving some out."""
+        return self.blocks.sum(axis=0) if without is None else self.blocks[~without].sum(axis=0)
+
+
+def grams(stretches: list[Stretch], noise: Noise, scale: np.ndarray, nuisances: int, blocks: int) -> Grams:
+    """Whiten and form the Gram matrices.
+
+    Args:
+        stretches: One per recording.
+        noise: Whitening.
+        scale: Prior standard deviation of each column's amplitude, shape (K,).
+        nuisances: Number of inertial columns, which come first.
+        blocks: Contiguous blocks per recording.
+    """
+    n = stretches[0].y.shape[1]
+    K = stretches[0].X.shape[-1]
+    out, rows, of = [], [], []
+    per_joint = np.zeros((n, K + 1, K + 1))
+    for r, s in enumerate(stretches):
+        edges = np.linspace(0, len(s.t), blocks + 1).astype(int)
+        G = np.zeros((blocks, K + 1, K + 1))
+        count = np.zeros((blocks, n))
+        for j in range(n):
+            active = np.flatnonzero(np.any(s.X[:, j] != 0.0, axis=0))
+            A = np.concatenate([s.X[:, j][:, active] * scale[active], s.y[:, j : j + 1]], axis=1)
+            A = noise.whitened(A, j, r)
+            ok = Noise.usable(s.use[:, j])
+            index = np.concatenate([active, [K]])
+            for b in range(blocks):
+                part = A[edges[b] : edges[b + 1]][ok[edges[b] : edges[b + 1]]]
+                gram = part.T @ part
+                G[b][np.ix_(index, index)] += gram
+                per_joint[j][np.ix_(index, index)] += gram
+                count[b, j] = len(part)
+        out.append(G)
+        rows.append(count)
+        of += [s.recording] * blocks
+    return Grams(np.concatenate(out), per_joint, np.array(of), np.concatenate(rows), nuisances)
+
+
+def eliminated(H: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
+    """Gram matrix after marginalising some columns (unit prior), and the log determinant that this costs."""
+    if len(columns) == 0:
+        return H, 0.0
+    M = H[np.ix_(columns, columns)] + np.eye(len(columns))
+    chol = linalg.cholesky(M, lower=True)
+    half = linalg.solve_triangular(chol, H[columns], lower=True)
+    return H - half.T @ half, 2.0 * float(np.log(np.diag(chol)).sum())
+
+
+@dataclasses.dataclass(frozen=True)
+class Posterior:
+    """Amplitudes of a set: mean and covariance, in units of their prior standard deviation."""
+
+    columns: np.ndarray
+    mean: np.ndarray
+    cov: np.ndarray
+
+
+def posterior(H: np.ndarray, columns: np.ndarray) -> Posterior:
+    """Posterior of the given columns (unit prior) from a Gram matrix whose last column is y."""
+    M = H[np.ix_(columns, columns)] + np.eye(len(columns))
+    cov = linalg.cho_solve(linalg.cho_factor(M), np.eye(len(columns)))
+    return Posterior(columns, cov @ H[columns, -1], cov)
+
+
+def gains(H: np.ndarray, candidates: list[Candidate], offset: int) -> tuple[np.ndarray, np.ndarray]:
+    """Log evidence that each candidate adds, and whether its amplitudes stay within what is admissible.
+
+    Args:
+        H: Gram matrix with everything else eliminated.
+        candidates: What to try.
+        offset: Column at which the candidates' amplitudes start.
+
+    Returns:
+        Gains, shape (len(candidates),); the fitted amplitudes in prior units, padded with NaN, shape (..., k).
+    """
+    width = max((len(c.columns) for c in candidates), default=1)
+    gain, mean = np.zeros(len(candidates)), np.full((len(candidates), width), np.nan)
+    for k in range(1, width + 1):
+        which = np.flatnonzero([len(c.columns) == k for c in candidates])
+        if len(which) == 0:
+            continue
+        index = np.stack([candidates[i].columns for i in which]) + offset
+        M = H[index[:, :, None], index[:, None, :]] + np.eye(k)
+        b = H[index, -1]
+        v = np.linalg.solve(M, b[..., None])[..., 0]
+        gain[which] = 0.5 * np.einsum("ik,ik->i", b, v) - 0.5 * np.linalg.slogdet(M)[1]
+        mean[which, :k] = v
+    return gain, mean
