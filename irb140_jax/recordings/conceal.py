@@ -67,7 +67,7 @@ class Secret:
         rigid: The true arm without the hidden effects: wrong inertials only.
         true: The true arm, effects that MuJoCo has natively included.
         nominal: What the controller believed.
-        survey: What the nominal arm does along the motions.
+        survey: What the true arm does along the motions without the hidden effects.
     """
 
     hidden: tuple[Hidden, ...]
@@ -125,10 +125,10 @@ def conceal(
     robot = robot_from_model(spec.compile(), source=str(mjcf)[:80])
     motions = list(motions) if motions is not None else three_motions(robot, seed=seed)
     dt = float(motions[0].t[1] - motions[0].t[0])
-    nominal = arm_model(spec, dt)
-    survey = survey_of(nominal, motions, every=max(1, round(0.01 / dt)))
+    nominal, rigid = arm_model(spec, dt), _true_model(mjcf, (), robot.joint_names, dt, inertial_error, seed)
+    survey = survey_of(rigid, motions, every=max(1, round(0.01 / dt)))
     hidden = tuple(_resolved(c, survey, robot.joint_names, seed, k) for k, c in enumerate(concealments))
-    rigid, true = _true_models(mjcf, hidden, robot.joint_names, dt, inertial_error, seed)
+    true = _true_model(mjcf, hidden, robot.joint_names, dt, inertial_error, seed)
     logs = tuple(closed_loop(nominal, true, hidden, motion, recording=k) for k, motion in enumerate(motions))
     noise = noise or Noise()
     step = max(1, round(1.0 / (rate * dt)))
@@ -256,23 +256,19 @@ def _resolved(concealment: Concealment, survey: Survey, names: Sequence[str], se
     return kind(joints, {**drawn.parameters, **concealment.parameters})
 
 
-def _true_models(
+def _true_model(
     mjcf: str | pathlib.Path, hidden: Sequence[Hidden], names: Sequence[str], dt: float, error: float, seed: int
-) -> tuple[mujoco.MjModel, mujoco.MjModel]:
-    """The arm with wrong inertials, and the same arm with the native effects in it."""
-    models = []
-    for effects in ((), hidden):
-        spec = arm_spec(mjcf)
-        for effect in effects:
-            effect.edit(spec, names)
-        model = arm_model(spec, dt)
-        perturb_inertials(model, error, np.random.default_rng([seed, 20]))
-        dofs = np.array([model.joint(name).dofadr[0] for name in names])
-        for effect in effects:
-            effect.install(model, dofs)
-        mujoco.mj_setConst(model, mujoco.MjData(model))
-        models.append(model)
-    return models[0], models[1]
+) -> mujoco.MjModel:
+    """The arm with wrong inertials and with whatever of the hidden effects MuJoCo has natively."""
+    spec = arm_spec(mjcf)
+    for effect in hidden:
+        effect.edit(spec, names)
+    model = arm_model(spec, dt)
+    perturb_inertials(model, error, np.random.default_rng([seed, 20]))
+    dofs = np.array([model.joint(name).dofadr[0] for name in names])
+    for effect in hidden:
+        effect.install(model, dofs)
+    return model
 
 
 def _recording(

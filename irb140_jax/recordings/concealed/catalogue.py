@@ -1,7 +1,7 @@
 """Every kind of physics that can be concealed, by its name in the vocabulary."""
 
 from irb140_jax.errors import InputError
-from irb140_jax.recordings.concealed import drive, friction
+from irb140_jax.recordings.concealed import drive, friction, surroundings, transmission
 from irb140_jax.recordings.concealed.hidden import Hidden
 
 HIDDEN: dict[str, type[Hidden]] = {
@@ -9,6 +9,10 @@ HIDDEN: dict[str, type[Hidden]] = {
     for kind in (
         friction.Coulomb, friction.Viscous, friction.Asymmetric, friction.Stribeck, friction.LoadDependent,
         drive.RotorInertia, drive.TorqueOffset, drive.TorqueGain, drive.TransmissionCoupling,
+        friction.NonlinearViscous, friction.ThermalDrift, friction.Presliding, friction.PositionDependent,
+        drive.TorqueRipple, drive.ActuatorLag, drive.TimeDelay, transmission.Elasticity, transmission.Backlash,
+        surroundings.GravitySpring, surroundings.GravityTilt, surroundings.Payload, surroundings.EncoderOffset,
+        surroundings.Contact, surroundings.ExternalWrench,
     )
 }
 FIRST_NINE = tuple(HIDDEN)[:9]

@@ -2,32 +2,14 @@
 
 import copy
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from irb140_jax.recordings.concealed.hidden import Hidden, Plant
+from irb140_jax.recordings.concealed.hidden import Hidden, Log, Plant
 from irb140_jax.recordings.excite import Excitation
 
 BANDWIDTH = 60.0  # [rad/s] of the position loop, some 10 Hz: usual for an arm of this size
-
-
-class Log(NamedTuple):
-    """What happened, at every step of the engine and without sensor noise.
-
-    Attributes:
-        t: Time [s], shape (T,).
-        q: Joint positions as the encoders see them, wrong zeros and motor sides included, shape (T, n).
-        qd, qdd: True joint velocities and accelerations, shape (T, n).
-        tau: What the controller logged, shape (T, n).
-    """
-
-    t: np.ndarray
-    q: np.ndarray
-    qd: np.ndarray
-    qdd: np.ndarray
-    tau: np.ndarray
 
 
 def closed_loop(
@@ -57,6 +39,7 @@ def closed_loop(
         effect.begin(plant)
     control, data, dofs = mujoco.MjData(nominal), plant.data, plant.dofs
     data.qpos[plant.qpos] = motion.q[0] - plant.zero
+    mujoco.mj_forward(true, data)
     kp, kd = BANDWIDTH**2, 2.0 * BANDWIDTH
     wanted = motion.qdd + kp * motion.q + kd * motion.qd
     q, qd, tau = np.empty((steps, n)), np.empty((steps + 1, n)), np.empty((steps, n))
@@ -80,4 +63,7 @@ def closed_loop(
         # What accelerates and carries the links is what the gear transmitted: applied torque less friction.
         plant.load = (data.qfrc_applied + data.qfrc_passive + data.qfrc_constraint)[dofs]
     qd[steps] = data.qvel[dofs]
-    return Log(motion.t, q, qd[:-1], np.diff(qd, axis=0) / plant.dt, tau)
+    log = Log(motion.t, q, qd[:-1], np.diff(qd, axis=0) / plant.dt, tau)
+    for effect in hidden:
+        log = effect.measured(log)
+    return log

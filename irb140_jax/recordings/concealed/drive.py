@@ -1,8 +1,10 @@
-"""Hidden physics of motors, gears and current sensors."""
+"""Hidden physics of motors, current sensors and the log: what the torque in the log is not."""
+
+import math
 
 import numpy as np
 
-from irb140_jax.recordings.concealed.hidden import Hidden, Plant, Survey
+from irb140_jax.recordings.concealed.hidden import Hidden, Log, Plant, Survey
 
 
 class RotorInertia(Hidden):
@@ -84,3 +86,77 @@ class TransmissionCoupling(Hidden):
         drag = self.parameters["viscous"] * (plant.qd[i] + sign * plant.qd[j])
         plant.torque[i] -= drag
         plant.torque[j] -= sign * drag
+
+
+class TorqueRipple(Hidden):
+    """A sin(2 pi n q + phase): cogging or gear mesh, at 3 to 25 Hz where the joint is fastest."""
+
+    slug = "torque_ripple"
+    units = {"amplitude": "{tau}", "cycles_per_rad": "1/{q}", "phase": "rad"}
+    amplitudes = ("amplitude",)
+
+    @classmethod
+    def shapes(cls, joints, survey, rng):
+        cycles = rng.uniform(3.0, 25.0) / survey.peak(joints[0])
+        return {"amplitude": 1.0, "cycles_per_rad": cycles, "phase": rng.uniform(-math.pi, math.pi)}
+
+    def ripple(self, q):
+        p = self.parameters
+        return p["amplitude"] * np.sin(2.0 * math.pi * p["cycles_per_rad"] * q + p["phase"])
+
+    def torque(self, survey: Survey):
+        return self.on_joint(survey, self.ripple(survey.q[:, self.joint]))
+
+    def act(self, plant: Plant):
+        plant.torque[self.joint] -= self.ripple(plant.q[self.joint])
+
+
+class ActuatorLag(Hidden):
+    """T d(real)/dt = logged - real; at most 4 ms, as a slower drive would not hold this controller stable."""
+
+    slug = "actuator_lag"
+    units = {"time_constant": "s"}
+    amplitudes = ("time_constant",)
+    largest = {"time_constant": 4e-3}
+
+    @classmethod
+    def shapes(cls, joints, survey, rng):
+        return {"time_constant": 1e-3}
+
+    def torque(self, survey: Survey):
+        return self.on_joint(survey, self.parameters["time_constant"] * survey.rate_of(survey.tau[:, self.joint]))
+
+    def begin(self, plant: Plant):
+        self._real: float | None = None
+        time_constant = self.parameters["time_constant"]
+        self._step = 1.0 - math.exp(-plant.dt / time_constant) if time_constant > 0.0 else 1.0
+
+    def act(self, plant: Plant):
+        logged = plant.torque[self.joint]
+        before = logged if self._real is None else self._real
+        self._real = before + self._step * (logged - before) if self._step < 1.0 else logged
+        plant.torque[self.joint] = self._real
+
+
+class TimeDelay(Hidden):
+    """Positions are logged late: q_logged(t) = q(t - delay), on all joints; at most 12 ms."""
+
+    slug = "time_delay"
+    units = {"delay": "s"}
+    amplitudes = ("delay",)
+    largest = {"delay": 12e-3}
+    joints_acted_on = 0
+
+    @classmethod
+    def shapes(cls, joints, survey, rng):
+        return {"delay": 1e-3}
+
+    def torque(self, survey: Survey):
+        return self.parameters["delay"] * survey.rate_of(survey.tau)
+
+    def measured(self, log: Log):
+        if self.parameters["delay"] == 0.0:
+            return log
+        before = log.t - self.parameters["delay"]
+        late = lambda x: np.stack([np.interp(before, log.t, column) for column in x.T], axis=1)  # noqa: E731
+        return log._replace(q=late(log.q), qd=late(log.qd), qdd=late(log.qdd))

@@ -4,7 +4,7 @@ MuJoCo solves for the friction force as a constraint, so a joint can truly stick
 position or direction only has to say how high the level is.
 """
 
-from typing import ClassVar
+import math
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from irb140_jax.recordings.concealed.hidden import Hidden, Plant, Survey
 class Coulomb(Hidden):
     """Fc sign(qd)."""
 
-    slug: ClassVar[str] = "coulomb_friction"
-    units: ClassVar[dict[str, str]] = {"coulomb": "{tau}"}
-    amplitudes: ClassVar[tuple[str, ...]] = ("coulomb",)
+    slug = "coulomb_friction"
+    units = {"coulomb": "{tau}"}
+    amplitudes = ("coulomb",)
 
     @classmethod
     def shapes(cls, joints, survey, rng):
@@ -32,9 +32,9 @@ class Coulomb(Hidden):
 class Viscous(Hidden):
     """Fv qd, MuJoCo's own joint damping."""
 
-    slug: ClassVar[str] = "viscous_friction"
-    units: ClassVar[dict[str, str]] = {"viscous": "{tau} s/{q}"}
-    amplitudes: ClassVar[tuple[str, ...]] = ("viscous",)
+    slug = "viscous_friction"
+    units = {"viscous": "{tau} s/{q}"}
+    amplitudes = ("viscous",)
 
     @classmethod
     def shapes(cls, joints, survey, rng):
@@ -50,9 +50,9 @@ class Viscous(Hidden):
 class Asymmetric(Hidden):
     """Fc+ while qd > 0, Fc- while qd < 0."""
 
-    slug: ClassVar[str] = "asymmetric_friction"
-    units: ClassVar[dict[str, str]] = {"coulomb_pos": "{tau}", "coulomb_neg": "{tau}"}
-    amplitudes: ClassVar[tuple[str, ...]] = ("coulomb_pos", "coulomb_neg")
+    slug = "asymmetric_friction"
+    units = {"coulomb_pos": "{tau}", "coulomb_neg": "{tau}"}
+    amplitudes = ("coulomb_pos", "coulomb_neg")
 
     @classmethod
     def shapes(cls, joints, survey, rng):
@@ -75,9 +75,9 @@ class Asymmetric(Hidden):
 class Stribeck(Hidden):
     """(Fc + (Fs - Fc) exp(-(qd/vs)^2)) sign(qd)."""
 
-    slug: ClassVar[str] = "stribeck_friction"
-    units: ClassVar[dict[str, str]] = {"coulomb": "{tau}", "static": "{tau}", "stribeck_velocity": "{q}/s"}
-    amplitudes: ClassVar[tuple[str, ...]] = ("coulomb", "static")
+    slug = "stribeck_friction"
+    units = {"coulomb": "{tau}", "static": "{tau}", "stribeck_velocity": "{q}/s"}
+    amplitudes = ("coulomb", "static")
 
     @classmethod
     def shapes(cls, joints, survey, rng):
@@ -99,9 +99,9 @@ class Stribeck(Hidden):
 class LoadDependent(Hidden):
     """(Fc + mu |transmitted torque|) sign(qd); transmitted: what carries and accelerates links and rotor."""
 
-    slug: ClassVar[str] = "load_dependent_friction"
-    units: ClassVar[dict[str, str]] = {"load_coefficient": "1", "coulomb": "{tau}"}
-    amplitudes: ClassVar[tuple[str, ...]] = ("load_coefficient", "coulomb")
+    slug = "load_dependent_friction"
+    units = {"load_coefficient": "1", "coulomb": "{tau}"}
+    amplitudes = ("load_coefficient", "coulomb")
 
     @classmethod
     def shapes(cls, joints, survey, rng):
@@ -116,3 +116,113 @@ class LoadDependent(Hidden):
     def act(self, plant: Plant):
         p, j = self.parameters, self.joint
         plant.friction[j] += p["coulomb"] + p["load_coefficient"] * abs(plant.load[j])
+
+
+class NonlinearViscous(Hidden):
+    """k |qd|^a sign(qd): thinner (a < 1) or thicker (a > 1) with speed."""
+
+    slug = "nonlinear_viscous_friction"
+    units = {"coefficient": "{tau} (s/{q})^a", "exponent": "1"}
+    amplitudes = ("coefficient",)
+
+    @classmethod
+    def shapes(cls, joints, survey, rng):
+        low, high = (0.35, 0.7) if rng.random() < 0.5 else (1.5, 2.2)
+        return {"coefficient": 1.0, "exponent": rng.uniform(low, high)}
+
+    def level(self, qd):
+        return self.parameters["coefficient"] * np.abs(qd) ** self.parameters["exponent"]
+
+    def torque(self, survey: Survey):
+        qd = survey.qd[:, self.joint]
+        return self.on_joint(survey, self.level(qd) * np.sign(qd))
+
+    def act(self, plant: Plant):
+        plant.friction[self.joint] += self.level(plant.qd[self.joint])
+
+
+class ThermalDrift(Hidden):
+    """Fv (1 - drop (1 - exp(-t/T))) qd: every recording starts cold, and warms up in seconds instead of minutes."""
+
+    slug = "thermal_friction_drift"
+    units = {"viscous_cold": "{tau} s/{q}", "relative_drop": "1", "time_constant": "s"}
+    amplitudes = ("viscous_cold",)
+
+    @classmethod
+    def shapes(cls, joints, survey, rng):
+        span = float(survey.t.max())
+        return {"viscous_cold": 1.0, "relative_drop": rng.uniform(0.4, 0.75),
+                "time_constant": span * rng.uniform(0.15, 0.5)}
+
+    def level(self, t):
+        p = self.parameters
+        return p["viscous_cold"] * (1.0 - p["relative_drop"] * (1.0 - np.exp(-t / p["time_constant"])))
+
+    def torque(self, survey: Survey):
+        return self.on_joint(survey, self.level(survey.t) * survey.qd[:, self.joint])
+
+    def act(self, plant: Plant):
+        plant.torque[self.joint] -= self.level(plant.t) * plant.qd[self.joint]
+
+
+class PositionDependent(Hidden):
+    """Fc (1 + depth exp(-((q - centre)/width)^2)) sign(qd): a rough stretch of the gear."""
+
+    slug = "position_dependent_friction"
+    units = {"coulomb": "{tau}", "depth": "1", "centre": "{q}", "width": "{q}"}
+    amplitudes = ("coulomb",)
+
+    @classmethod
+    def shapes(cls, joints, survey, rng):
+        q = survey.q[:, joints[0]]
+        low, high = np.quantile(q, [0.2, 0.8])
+        return {"coulomb": 1.0, "depth": rng.uniform(1.0, 2.5), "centre": rng.uniform(low, high),
+                "width": (high - low) * rng.uniform(0.12, 0.3)}
+
+    def level(self, q):
+        p = self.parameters
+        return p["coulomb"] * (1.0 + p["depth"] * np.exp(-(((q - p["centre"]) / p["width"]) ** 2)))
+
+    def torque(self, survey: Survey):
+        return self.on_joint(survey, self.level(survey.q[:, self.joint]) * np.sign(survey.qd[:, self.joint]))
+
+    def act(self, plant: Plant):
+        plant.friction[self.joint] += self.level(plant.q[self.joint])
+
+
+class Presliding(Hidden):
+    """Dahl's bristles: F = stiffness z, dz/dt = qd (1 - F sign(qd) / Fc).
+
+    Over a move dx in one direction the law has an exact solution, F -> Fc s + (F - Fc s) exp(-stiffness |dx| / Fc).
+    """
+
+    slug = "presliding_hysteresis"
+    units = {"coulomb": "{tau}", "stiffness": "{tau}/{q}"}
+    amplitudes = ("coulomb", "stiffness")
+
+    @classmethod
+    def shapes(cls, joints, survey, rng):
+        travel = np.ptp(survey.q[:, joints[0]])
+        return {"coulomb": 1.0, "stiffness": 1.0 / (travel * rng.uniform(0.002, 0.02))}
+
+    def begin(self, plant: Plant):
+        self._force = 0.0
+
+    def _moved(self, force, dx):
+        coulomb = self.parameters["coulomb"]
+        if coulomb == 0.0 or dx == 0.0:
+            return force
+        limit = math.copysign(coulomb, dx)
+        return limit + (force - limit) * math.exp(-self.parameters["stiffness"] * abs(dx) / coulomb)
+
+    def torque(self, survey: Survey):
+        q, torque, force = survey.q[:, self.joint], np.zeros(len(survey.t)), 0.0
+        for k in range(1, len(q)):
+            fresh = survey.recording[k] != survey.recording[k - 1]
+            force = 0.0 if fresh else self._moved(force, q[k] - q[k - 1])
+            torque[k] = force
+        return self.on_joint(survey, torque)
+
+    def act(self, plant: Plant):
+        self._force = self._moved(self._force, plant.qd[self.joint] * plant.dt)
+        plant.torque[self.joint] -= self._force

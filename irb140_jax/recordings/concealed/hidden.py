@@ -1,5 +1,6 @@
 """What every hidden effect is: physics put into a MuJoCo plant, with a strength set by its share of the torque."""
 
+import copy
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple, Self
 
@@ -37,11 +38,28 @@ class Plant:
         self.inner = np.zeros(model.nv)
 
 
-class Survey(NamedTuple):
-    """What the nominal arm does along all motions together; strengths are set on it before anything is simulated.
+class Log(NamedTuple):
+    """What happened, at every step of the engine and without sensor noise.
 
     Attributes:
-        model: The nominal arm.
+        t: Time [s], shape (T,).
+        q: Joint positions as the encoders see them, wrong zeros and motor sides included, shape (T, n).
+        qd, qdd: True joint velocities and accelerations, shape (T, n).
+        tau: What the controller logged, shape (T, n).
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    tau: np.ndarray
+
+
+class Survey(NamedTuple):
+    """What the rigid arm does along all motions together; strengths are set on it before anything is simulated.
+
+    Attributes:
+        model: The arm without hidden effects.
         t: Time in each sample's own recording [s], shape (T,).
         q, qd, qdd: The motion, shape (T, n).
         load: The model's torque, shape (T, n).
@@ -62,6 +80,14 @@ class Survey(NamedTuple):
         """Largest speed of a joint [rad/s or m/s]."""
         return float(np.abs(self.qd[:, joint]).max())
 
+    def rate_of(self, values: np.ndarray) -> np.ndarray:
+        """Time derivative of samples, recording by recording, shape as given."""
+        rate = np.empty_like(values)
+        for k in range(int(self.recording[-1]) + 1):
+            rows = self.recording == k
+            rate[rows] = np.gradient(values[rows], self.t[rows], axis=0)
+        return rate
+
     def rms(self, joint: int) -> float:
         """Root mean square of a joint's torque [N m or N]."""
         return float(np.sqrt(np.mean(self.tau[:, joint] ** 2)))
@@ -78,12 +104,14 @@ class Hidden:
         slug: Name in the vocabulary.
         units: Parameter -> unit; {tau} and {q} stand for N m, rad or for N, m.
         amplitudes: Parameters to which the torque is proportional; they are scaled to the wanted share.
+        largest: Largest believable size of an amplitude; where it is reached, the share is smaller than wanted.
         joints_acted_on: How many joints one instance acts on; 0: on all of them.
     """
 
     slug: ClassVar[str]
     units: ClassVar[dict[str, str]]
     amplitudes: ClassVar[tuple[str, ...]]
+    largest: ClassVar[dict[str, float]] = {}
     joints_acted_on: ClassVar[int] = 1
 
     def __init__(self, joints: Sequence[int], parameters: dict[str, float]):
@@ -96,8 +124,7 @@ class Hidden:
 
         Args:
             joints: Indices of the joints it acts on.
-            share: RMS of the effect's torque as a share of the joint's torque RMS, over all motions together; where
-                the effect acts on several joints, the root mean square of the shares.
+            share: Wanted share of the torque, see `share`.
             survey: What the nominal arm does.
             rng: Source of the shapes.
 
@@ -106,6 +133,8 @@ class Hidden:
         """
         unit = cls(joints, cls.shapes(joints, survey, rng))
         factor = share / max(unit.share(survey), 1e-300)
+        room = [cls.largest[k] / abs(unit.parameters[k]) for k in cls.largest]
+        factor = min([factor, *room])
         scaled = {k: v * factor if k in cls.amplitudes else v for k, v in unit.parameters.items()}
         return cls(joints, scaled)
 
@@ -115,20 +144,35 @@ class Hidden:
         raise NotImplementedError
 
     def share(self, survey: Survey) -> float:
-        """RMS of this effect's torque as a share of the joints' torque RMS."""
-        torque = self.torque(survey)
-        ratios = [np.sqrt(np.mean(torque[:, j] ** 2)) / max(survey.rms(j), 1e-300) for j in self.joints]
-        return float(np.sqrt(np.mean(np.square(ratios))))
+        """RMS of this effect's torque as a share of the joint's torque RMS, over all motions together.
+
+        Where it acts on two joints, the root mean square of their shares; where it acts on all, the share of the
+        whole vector of torques.
+        """
+        squares = np.mean(self.torque(survey) ** 2, axis=0)
+        rms2 = np.maximum(np.mean(survey.tau**2, axis=0), 1e-300)
+        if self.joints_acted_on == 0:
+            return float(np.sqrt(squares.sum() / rms2.sum()))
+        return float(np.sqrt(np.mean([squares[j] / rms2[j] for j in self.joints])))
 
     def torque(self, survey: Survey) -> np.ndarray:
-        """What the effect adds to the logged torque along the surveyed motions, to first order, shape (T, n)."""
-        raise NotImplementedError
+        """What the effect adds to the logged torque along the surveyed motions, to first order, shape (T, n).
+
+        Unless a subclass has a formula: what the native change of the model makes of the rigid-body torque.
+        """
+        model = copy.copy(survey.model)
+        self.install(model, np.arange(model.nv))
+        return rigid_torque(model, survey.q, survey.qd, survey.qdd) - survey.load
 
     def edit(self, spec: mujoco.MjSpec, names: Sequence[str]) -> None:
         """Change the editable model of the true arm, once, before it is compiled."""
 
     def install(self, model: mujoco.MjModel, dofs: np.ndarray) -> None:
         """Change the compiled model of the true arm, once, where MuJoCo has the effect natively."""
+
+    def measured(self, log: Log) -> Log:
+        """What the data logger makes of what happened."""
+        return log
 
     def begin(self, plant: Plant) -> None:
         """Reset whatever state the effect has, at the start of every recording."""
@@ -152,7 +196,7 @@ class Hidden:
 
 
 def survey_of(model: mujoco.MjModel, motions: Sequence, every: int) -> Survey:
-    """What the nominal arm does along the motions, at every so many samples."""
+    """What the arm of this model does along the motions, at every so many samples."""
     parts = [(m.t[::every], m.q[::every], m.qd[::every], m.qdd[::every]) for m in motions]
     t, q, qd, qdd = (np.concatenate(x) for x in zip(*parts, strict=True))
     load = rigid_torque(model, q, qd, qdd)
