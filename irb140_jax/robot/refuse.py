@@ -61,7 +61,7 @@ def _couplings(model: mujoco.MjModel) -> Iterator[str]:
     active = np.flatnonzero(model.eq_active0)
     if active.size:
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_EQUALITY, int(active[0]))
-        yield f"equality constraint {_shown(name)} closes a loop or couples joints, which a serial chain has not: remove it"
+        yield f"equality constraint {_shown(name)} closes a loop or couples joints; a serial chain has none: remove it"
     parts = (("ntendon", "tendons"), ("nflex", "deformable bodies (flex)"), ("nplugin", "plugins"))
     for field, what in parts:
         if getattr(model, field, 0):

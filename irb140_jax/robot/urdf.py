@@ -68,7 +68,7 @@ def _refuse(robot: ET.Element, source: str) -> None:
             known = ", ".join(KNOWN_TYPES)
             raise RobotError(f"{source}: joint '{name}' is of type '{kind}'; known: {known}: fix it or remove it")
         if joint.find("mimic") is not None:
-            raise RobotError(f"{source}: joint '{name}' mimics another; only independent joints are known: make it fixed")
+            raise RobotError(f"{source}: joint '{name}' mimics another one; known: independent joints: make it fixed")
 
 
 def _compiler(robot: ET.Element) -> ET.Element:
