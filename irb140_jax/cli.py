@@ -1,4 +1,4 @@
-"""The command line: one dataclass a command.  Heavy imports wait until a command runs, so that --help answers at once."""
+"""The command line, one dataclass a command.  Heavy imports wait until a command runs: --help answers at once."""
 
 import contextlib
 import dataclasses
@@ -47,17 +47,19 @@ class Diagnose:
     """TOML file that maps other column names and units."""
 
     def run(self) -> None:
-        from irb140_jax.recordings import read_recording
-        from irb140_jax.report import check_folder
-        from irb140_jax.robot import irb140, load_robot
+        from irb140_jax.report.folder import check_folder
 
         check_folder(self.out)
         if not self.recordings:
-            raise InputError("diagnose: no recording was named; give at least one, for example irb140 diagnose a.csv --out d")
+            raise InputError("diagnose: no recording was named; give at least one: irb140 diagnose REC --out DIR")
         if not (math.isfinite(self.inertial_uncertainty) and self.inertial_uncertainty > 0):
             raise InputError(
-                f"--inertial-uncertainty {self.inertial_uncertainty}: it has to be a positive share, for example 0.05 for 5 %"
+                f"--inertial-uncertainty {self.inertial_uncertainty}: allowed is a positive share, say 0.05 for 5 %"
             )
+
+        from irb140_jax.recordings import read_recording
+        from irb140_jax.robot import irb140, load_robot
+
         robot = load_robot(self.robot) if self.robot else irb140()
         recordings = [read_recording(path, robot, columns=self.columns) for path in self.recordings]
         result = _diagnosed(robot, recordings, self.inertial_uncertainty)
@@ -82,13 +84,15 @@ class Predict:
     """TOML file that maps other column names and units."""
 
     def run(self) -> None:
+        from irb140_jax.report.folder import check_file, whole_file
+
+        check_file(self.out)
+
         import pandas as pd
 
         from irb140_jax.mismatch import load_model, predict
         from irb140_jax.recordings import read_recording
-        from irb140_jax.report import check_file, whole_file
 
-        check_file(self.out)
         model = load_model(self.folder)
         recording = read_recording(self.recording, model.robot, columns=self.columns)
         torque = predict(model, recording)
@@ -111,15 +115,18 @@ class Demo:
     """Folder for recordings, diagnosis, report and truth; by default irb140-demo-SEED in the current one."""
 
     def run(self) -> None:
-        from irb140_jax.recordings import read_recording, write_recording
-        from irb140_jax.recordings.conceal import demo_case
-        from irb140_jax.report import check_folder, print_reveal, revealed
-        from irb140_jax.robot import irb140
+        from irb140_jax.report.folder import check_folder
 
         out = self.out or pathlib.Path(f"irb140-demo-{self.seed}")
         check_folder(out)
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: it has to be 0 or larger")
+
+        from irb140_jax.recordings import read_recording, write_recording
+        from irb140_jax.recordings.conceal import demo_case
+        from irb140_jax.report import print_reveal, revealed
+        from irb140_jax.robot import irb140
+
         with _progress() as progress:
             progress("MuJoCo drives an arm with something hidden in it")
             case = demo_case(self.seed)
@@ -151,8 +158,8 @@ class Excite:
 
     def run(self) -> None:
         raise InputError(
-            "excite: this version can't design motions yet; the report's section 'What this motion could not have shown' "
-            "and the line 'To separate them' of each finding say in words what to record"
+            "excite: this version can't design motions yet; the report's section 'What this motion could not have "
+            "shown' and the lines 'To separate them' of its findings say in words what to record"
         )
 
 

@@ -34,7 +34,7 @@ def example_diagnosis() -> dict:
                     {
                         "effect": "load_dependent_friction",
                         "probability": 0.03,
-                        "separate_by": "Move joint2 slowly through the same poses with and without a known mass at the tool.",
+                        "separate_by": "Move joint2 slowly through the same poses with and without a known mass.",
                     }
                 ],
             },
@@ -65,8 +65,8 @@ def example_diagnosis() -> dict:
         ],
         "fit": fit,
         "summary": "The model leaves out Stribeck friction on joint2 and a coupling of joint5 and joint6. "
-        "With both, the torque error on unseen data falls from 3.1 to 0.4 N m; on joint5 a third of what is left has a cause "
-        "that the library does not know.",
+        "With both, the torque error on unseen data falls from 3.1 to 0.4 N m; on joint5 a third of what is left has a "
+        "cause that the library does not know.",
     }
 
 

@@ -89,7 +89,12 @@ def test_a_planted_breach_in_an_effect_is_found(source):
 
 @pytest.mark.parametrize(
     "source",
-    ["from irb140_jax.dynamics import regressor", "from irb140_jax.effects.base import Motion", "from . import base", "import jax"],
+    [
+        "from irb140_jax.dynamics import regressor",
+        "from irb140_jax.effects.base import Motion",
+        "from . import base",
+        "import jax",
+    ],
 )
 def test_an_import_from_above_or_from_the_own_folder_is_no_breach(source):
     assert not breaches(source, ("effects", "coulomb_friction"))

@@ -10,8 +10,7 @@ import helpers_report
 import pytest
 from rich.console import Console
 
-from irb140_jax.report import html_report, print_diagnosis, print_reveal, revealed
-from irb140_jax.report import svg, text
+from irb140_jax.report import html_report, print_diagnosis, print_reveal, revealed, svg, text
 
 VOID = {"meta", "br", "img", "hr", "input", "link", "rect", "path"}
 
@@ -68,8 +67,8 @@ def test_every_finding_is_in_the_report_with_its_parameters_units_and_alternativ
         assert text.words(finding["effect"]).capitalize() in page.visible
         assert finding["where"] in page.visible
         for name, p in finding["parameters"].items():
-            row = f"{text.words(name)} {text.with_std(p['value'], p['std'])} {text.interval_90(p['value'], p['std'])} {p['unit']}"
-            assert row in page.visible
+            value, interval = text.with_std(p["value"], p["std"]), text.interval_90(p["value"], p["std"])
+            assert f"{text.words(name)} {value} {interval} {p['unit']}" in page.visible
         for other in finding["alternatives"]:
             assert other["separate_by"] in page.visible
 
@@ -149,7 +148,11 @@ def test_the_terminal_names_every_finding_with_value_and_unit(diagnosis):
 
 def test_the_truth_is_sorted_into_found_missed_and_extra(diagnosis):
     hidden = [
-        {"effect": "transmission_coupling", "joints": ["joint6", "joint5"], "parameters": {"viscous": {"value": 2.3, "unit": "-"}}},
+        {
+            "effect": "transmission_coupling",
+            "joints": ["joint6", "joint5"],
+            "parameters": {"viscous": {"value": 2.3, "unit": "N m s/rad"}},
+        },
         {"effect": "stribeck_friction", "joints": ["joint3"], "parameters": {}},
     ]
     reveal = revealed(hidden, diagnosis, "seal")

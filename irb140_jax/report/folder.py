@@ -46,7 +46,7 @@ def _check_parent(out: pathlib.Path) -> None:
 
 @contextlib.contextmanager
 def whole_folder(out: pathlib.Path) -> Iterator[pathlib.Path]:
-    """A new folder beside `out` to write into; it takes the place of `out` when the block ends, and only if it ends well.
+    """A new folder beside `out` to write into; it takes the place of `out` if the block ends well, and else vanishes.
 
     Args:
         out: Where the results shall be; new, empty or a former diagnosis.

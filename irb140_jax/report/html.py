@@ -1,4 +1,4 @@
-"""The report: one HTML file that needs neither network nor scripts.  It shows what the diagnosis holds, computes nothing."""
+"""The report, one HTML file without network or scripts: it shows what the diagnosis holds and computes nothing."""
 
 import functools
 import pathlib
@@ -10,8 +10,8 @@ from markupsafe import Markup
 from irb140_jax.report import svg, text
 from irb140_jax.report.reveal import Reveal
 
-# Okabe and Ito's colours, told apart by every kind of colour vision.  The measurement is a pale broad line beneath, since
-# a good model would hide a fine one.
+# Okabe and Ito's colours, told apart by every kind of colour vision.  The measurement is a pale broad line beneath,
+# since a good model would hide a fine one.
 MEASURED_LINE = {"colour": "#c6cad1", "width": 4.0, "dash": ""}
 MODEL_LINES = {
     "nominal": {"colour": "#5b616b", "width": 1.1, "dash": "4 3"},
@@ -37,7 +37,9 @@ def html_report(diagnosis: Mapping, views: Mapping, reveal: Reveal | None = None
         views: Maps, traces, ranking, spectra, inertials and notes that belong to it.
         reveal: What was hidden, where that is known (a demonstration).
     """
-    views = {name: [] for name in ("recordings", "inertials", "notes")} | {"maps": {}} | dict(views)
+    empty: dict = {name: [] for name in ("recordings", "ranking", "inertials", "notes")}
+    empty |= {name: {} for name in ("maps", "traces", "residual_spectrum")}
+    views = {**empty, **views}
     title, sentence = text.VERDICTS.get(diagnosis["verdict"], (text.words(diagnosis["verdict"]), ""))
     return _template().render(
         diagnosis=diagnosis,
@@ -46,10 +48,10 @@ def html_report(diagnosis: Mapping, views: Mapping, reveal: Reveal | None = None
         title=title,
         sentence=sentence,
         reveal=reveal,
-        maps=[{"joint": joint, **_map_pair(data)} for joint, data in views.get("maps", {}).items()],
-        traces=[{"joint": joint, **_trace(data, _unit(views, joint))} for joint, data in views.get("traces", {}).items()],
-        spectra=[_spectrum(joint, data) for joint, data in views.get("residual_spectrum", {}).items()],
-        ranking=[_bars(stage, views.get("ranking", [])) for stage in ("alone", "given the others")],
+        maps=[{"joint": joint, **_map_pair(data)} for joint, data in views["maps"].items()],
+        traces=[{"joint": joint, **_trace(data, _unit(views, joint))} for joint, data in views["traces"].items()],
+        spectra=[_spectrum(joint, data) for joint, data in views["residual_spectrum"].items()],
+        ranking=[_bars(stage, views["ranking"]) for stage in ("alone", "given the others")],
         lines={"measured": MEASURED_LINE, **MODEL_LINES},
         meanings=MODEL_TEXTS,
     )
@@ -73,7 +75,7 @@ def _template() -> jinja2.Template:
 
 def _unit(views: Mapping, joint: str) -> str:
     """Unit of a joint's torque."""
-    return views.get("maps", {}).get(joint, {}).get("unit", "N m")
+    return views["maps"].get(joint, {}).get("unit", "N m")
 
 
 def _map_pair(data: Mapping) -> dict:

@@ -1,6 +1,6 @@
 """What was hidden beside what was found."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 
@@ -26,7 +26,7 @@ class Reveal(NamedTuple):
         return not self.missed and not self.extra
 
 
-def revealed(hidden: list[Mapping], diagnosis: Mapping, seal: str) -> Reveal:
+def revealed(hidden: Sequence[Mapping], diagnosis: Mapping, seal: str) -> Reveal:
     """Sort hidden effects by what the diagnosis says of them.
 
     Args:

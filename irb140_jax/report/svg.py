@@ -1,4 +1,4 @@
-"""Small drawings for the report, as SVG text: a heat map, a colour bar, a line plot.  Nothing but scaling happens here."""
+"""Small drawings for the report as SVG text: heat map, colour bar, line plot.  Nothing but scaling happens here."""
 
 import math
 from collections.abc import Sequence
@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 Grid = Sequence[Sequence[float | None]]
 
-# Blue to orange through a light grey: told apart by every kind of colour vision, and the middle is not the page's white.
-DIVERGING = ((8, 69, 148), (66, 146, 198), (158, 202, 225), (236, 236, 233), (253, 190, 133), (230, 85, 13), (140, 45, 4))
+# Blue to orange through a light grey: told apart by every kind of colour vision; the middle is not the page's white.
+BLUES = ((8, 69, 148), (66, 146, 198), (158, 202, 225))
+ORANGES = ((253, 190, 133), (230, 85, 13), (140, 45, 4))
+DIVERGING = (*BLUES, (236, 236, 233), *ORANGES)
 SHADES = 24  # distinct colours of a map; more can't be told apart and would only make the file longer
 
 

@@ -11,7 +11,12 @@ from rich.table import Column, Table
 from irb140_jax.report import text
 from irb140_jax.report.reveal import Reveal
 
-VERDICT_COLOURS = {"no_mismatch": "green", "parameters_only": "green", "physics_left_out": "dark_orange", "unexplained": "red"}
+VERDICT_COLOURS = {
+    "no_mismatch": "green",
+    "parameters_only": "green",
+    "physics_left_out": "dark_orange",
+    "unexplained": "red",
+}
 
 
 def print_diagnosis(diagnosis: Mapping, console: Console) -> None:
@@ -60,7 +65,8 @@ def print_reveal(reveal: Reveal, console: Console) -> None:
 
 def _findings(findings: list[Mapping], joints: list[str]) -> Padding:
     """One row per parameter of each finding."""
-    table = Table("left out", "joints", "parameter", _right("value"), "unit", _right("probability"), box=box.SIMPLE_HEAD)
+    heads = ("left out", "joints", "parameter", _right("value"), "unit", _right("probability"))
+    table = Table(*heads, box=box.SIMPLE_HEAD)
     for finding in findings:
         head = [text.words(finding["effect"]), escape(text.joint_list(finding["joints"], joints))]
         tail = text.percent(finding["evidence"]["probability"])

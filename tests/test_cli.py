@@ -1,0 +1,296 @@
+"""The command line: complete help, errors of one line with exit code 2, results whole or not at all."""
+
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import types
+
+import helpers_report
+import mujoco
+import numpy as np
+import pandas as pd
+import pytest
+
+import irb140_jax.mismatch
+import irb140_jax.recordings
+from irb140_jax import cli
+from irb140_jax.errors import InputError
+
+MODEL = pathlib.Path(__file__).parents[1] / "assets" / "irb140.xml"
+COMMANDS = ("diagnose", "predict", "demo", "excite")
+
+
+def table_of_a_motion(seconds: float = 12.0, rate: float = 100.0) -> pd.DataFrame:
+    """A recording of the IRB 140 along sums of sines; torque by MuJoCo, with some noise."""
+    model = mujoco.MjModel.from_xml_path(str(MODEL))
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(1)
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    w = 2 * np.pi * np.array([0.2, 0.35, 0.55])
+    a, phase = rng.uniform(0.1, 0.3, (3, model.nv)), rng.uniform(0, 6, (3, model.nv))
+    angle = w[:, None, None] * t[None, :, None] + phase[:, None]
+    q = (a[:, None] * np.sin(angle)).sum(0)
+    qd = (a[:, None] * w[:, None, None] * np.cos(angle)).sum(0)
+    qdd = (-a[:, None] * w[:, None, None] ** 2 * np.sin(angle)).sum(0)
+    tau = np.empty_like(q)
+    for i in range(len(t)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[i], qd[i], qdd[i]
+        mujoco.mj_inverse(model, data)
+        tau[i] = data.qfrc_inverse
+    tau += 0.01 * tau.std(0) * rng.standard_normal(tau.shape)
+    names = [model.joint(i).name for i in range(model.njnt)]
+    columns = {"t": t} | {f"q.{j}": q[:, i] for i, j in enumerate(names)}
+    return pd.DataFrame(columns | {f"tau.{j}": tau[:, i] for i, j in enumerate(names)})
+
+
+@pytest.fixture(scope="module")
+def table() -> pd.DataFrame:
+    return table_of_a_motion()
+
+
+@pytest.fixture
+def recording(table, tmp_path) -> pathlib.Path:
+    """A recording that can be used, in a folder of its own."""
+    path = tmp_path / "in" / "wave.csv"
+    path.parent.mkdir()
+    table.to_csv(path, index=False)
+    return path
+
+
+@pytest.fixture
+def stub(monkeypatch):
+    """A diagnosis that takes no time; the command line around it is the real one."""
+    result = types.SimpleNamespace(diagnosis=helpers_report.example_diagnosis(), views=helpers_report.example_views())
+    seen = {}
+
+    def diagnose(robot, recordings, config, progress):
+        progress("looking")
+        seen.update(robot=robot, recordings=recordings, config=config)
+        return result
+
+    def save(result, out_dir):
+        (out_dir / "diagnosis.json").write_text(json.dumps(result.diagnosis))
+        (out_dir / "model.json").write_text("{}")
+
+    def predict(model, recording):
+        return {name: k * np.asarray(recording.tau) for k, name in enumerate(("nominal", "refit", "corrected"))}
+
+    def load_model(folder):
+        from irb140_jax.robot import load_robot
+
+        return types.SimpleNamespace(robot=load_robot(MODEL))
+
+    for function in (diagnose, save, predict, load_model):
+        monkeypatch.setattr(irb140_jax.mismatch, function.__name__, function, raising=False)
+    monkeypatch.setattr(
+        irb140_jax.mismatch, "DiagnoseConfig", lambda **kwargs: types.SimpleNamespace(**kwargs), raising=False
+    )
+    return seen
+
+
+def irb140(*words, cwd=None) -> subprocess.CompletedProcess:
+    """The command as a process of its own."""
+    code = "import sys; from irb140_jax.cli import main; sys.exit(main())"
+    environment = os.environ | {"PYTHONPATH": str(MODEL.parents[1]), "COLUMNS": "100"}
+    command = [sys.executable, "-c", code, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=cwd, env=environment)
+
+
+def refused(capsys, *words) -> str:
+    """The one line that a command says when it refuses its input."""
+    assert cli.main([str(word) for word in words]) == 2
+    said = capsys.readouterr().err
+    assert said.endswith("\n") and said.count("\n") == 1, said
+    return said
+
+
+def test_the_help_has_one_line_for_every_command():
+    done = irb140("--help")
+    assert done.returncode == 0
+    for command in COMMANDS:
+        (line,) = [line for line in done.stdout.splitlines() if f"• {command} " in line]
+        assert re.search(r"\w.*\.\s*│?$", line), line  # the sentence ends on its line
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("diagnose", ["REC", "--out", "--robot", "--inertial-uncertainty", "0.05", "--columns"]),
+        ("predict", ["DIR", "REC", "--out", "--columns"]),
+        ("demo", ["--seed", "--out"]),
+        ("excite", ["DIR", "--out"]),
+    ],
+)
+def test_the_help_of_a_command_names_every_option(command, words, capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main([command, "--help"])
+    assert stop.value.code == 0
+    said = capsys.readouterr().out
+    assert not [word for word in words if word not in said]
+
+
+def test_the_help_imports_nothing_heavy():
+    code = (
+        "import sys\nfrom irb140_jax.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass\n"
+        "print([m for m in ('jax', 'mujoco', 'pandas', 'numpy', 'matplotlib', 'jinja2') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip().endswith("[]")
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ([], "diagnose"),
+        (["nonsense"], "nonsense"),
+        (["diagnose", "a.csv"], "--out"),
+        (["diagnose", "--out", "d"], "recording"),
+        (["diagnose", "a.csv", "--out", "d", "--frobnicate", "3"], "--frobnicate"),
+        (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "much"], "--inertial-uncertainty"),
+        (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "-0.1"], "--inertial-uncertainty"),
+        (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "nan"], "--inertial-uncertainty"),
+        (["demo", "--seed", "-1"], "--seed"),
+        (["excite", "d", "--out", "f.csv"], "excite"),
+    ],
+)
+def test_wrong_words_on_the_command_line_give_one_line_that_names_them(words, named, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert named in refused(capsys, *words)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_that_is_not_there_is_named_and_nothing_is_written(tmp_path):
+    done = irb140("diagnose", "absent.csv", "--out", "d", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1 and "absent.csv" in done.stderr
+    assert not done.stdout and not list(tmp_path.iterdir())
+
+
+def test_a_recording_without_torque_is_refused_by_naming_file_and_column(recording, table, tmp_path, capsys):
+    table.drop(columns="tau.joint3").to_csv(recording, index=False)
+    said = refused(capsys, "diagnose", recording, "--out", tmp_path / "d")
+    assert "wave.csv" in said and "tau.joint3" in said
+    assert not (tmp_path / "d").exists()
+
+
+def test_a_robot_model_that_is_not_there_is_named(recording, tmp_path, capsys):
+    said = refused(capsys, "diagnose", recording, "--out", tmp_path / "d", "--robot", tmp_path / "absent.xml")
+    assert "absent.xml" in said
+
+
+def test_a_folder_with_other_things_in_it_is_not_overwritten(recording, tmp_path, capsys, stub):
+    out = tmp_path / "precious"
+    out.mkdir()
+    (out / "thesis.tex").write_text("x")
+    assert "thesis.tex" in refused(capsys, "diagnose", recording, "--out", out)
+    assert [path.name for path in out.iterdir()] == ["thesis.tex"]
+
+
+def test_an_out_that_is_a_file_is_refused(recording, tmp_path, capsys, stub):
+    (tmp_path / "d").write_text("x")
+    refused(capsys, "diagnose", recording, "--out", tmp_path / "d")
+    refused(capsys, "diagnose", recording, "--out", tmp_path / "d" / "below")
+    assert (tmp_path / "d").read_text() == "x"
+
+
+def test_diagnose_writes_diagnosis_model_and_report_and_says_the_verdict(recording, tmp_path, capsys, stub):
+    out = tmp_path / "new" / "d"
+    assert (
+        cli.main(["diagnose", str(recording), str(recording), "--out", str(out), "--inertial-uncertainty", "0.1"]) == 0
+    )
+    assert sorted(path.name for path in out.iterdir()) == ["diagnosis.json", "model.json", "report.html"]
+    assert [path.name for path in out.parent.iterdir()] == ["d"]  # no scratch folder is left behind
+    assert "Physics left out." in capsys.readouterr().out
+    assert len(stub["recordings"]) == 2 and stub["config"].inertial_uncertainty == 0.1
+    assert stub["robot"].joint_names == helpers_report.JOINTS
+
+
+def test_a_former_diagnosis_is_replaced_as_a_whole(recording, tmp_path, stub):
+    out = tmp_path / "d"
+    assert cli.main(["diagnose", str(recording), "--out", str(out)]) == 0
+    (out / "stale.txt").write_text("x")
+    assert cli.main(["diagnose", str(recording), "--out", str(out)]) == 0
+    assert not (out / "stale.txt").exists() and (out / "report.html").exists()
+
+
+@pytest.mark.parametrize("error", [InputError("two lines\nof trouble"), RuntimeError("a bug")])
+def test_a_run_that_breaks_off_leaves_a_former_diagnosis_as_it_was(recording, tmp_path, stub, monkeypatch, error):
+    out = tmp_path / "d"
+    assert cli.main(["diagnose", str(recording), "--out", str(out)]) == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def broken(*_):
+        raise error
+
+    monkeypatch.setattr(irb140_jax.mismatch, "save", broken)
+    if isinstance(error, InputError):
+        assert cli.main(["diagnose", str(recording), "--out", str(out)]) == 2
+    else:  # a bug keeps its traceback, and Python its exit code 1
+        with pytest.raises(RuntimeError):
+            cli.main(["diagnose", str(recording), "--out", str(out)])
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["d", "in"]
+
+
+def test_predict_writes_one_row_per_row_with_the_columns_of_the_contract(recording, table, tmp_path, stub):
+    out = tmp_path / "p.csv"
+    assert cli.main(["predict", str(tmp_path), str(recording), "--out", str(out)]) == 0
+    predicted = pd.read_csv(out)
+    models, joints = ("nominal", "refit", "corrected"), helpers_report.JOINTS
+    assert list(predicted.columns) == ["t", *(f"tau_{model}.{joint}" for model in models for joint in joints)]
+    np.testing.assert_allclose(predicted["t"], table["t"], rtol=1e-8)  # nine digits are written
+    np.testing.assert_allclose(predicted["tau_corrected.joint4"], 2 * table["tau.joint4"], rtol=1e-8)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in", "p.csv"]
+
+
+def test_predict_refuses_a_folder_as_its_file(recording, tmp_path, capsys, stub):
+    refused(capsys, "predict", tmp_path, recording, "--out", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("environment", "expected"),
+    [({"IRB140_CACHE": "off"}, "None"), ({"IRB140_CACHE": "/x"}, "/x"), ({"XDG_CACHE_HOME": "/y"}, "/y/irb140_jax")],
+)
+def test_the_compilation_cache_is_where_the_environment_says(environment, expected):
+    code = "from irb140_jax.compilation_cache import set_up_compilation_cache as f; print(f())"
+    clean = {k: v for k, v in os.environ.items() if k not in ("IRB140_CACHE", "JAX_COMPILATION_CACHE_DIR")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True, env=clean | environment
+    )
+    assert done.stdout.strip() == expected
+
+
+def test_demo_shows_the_seal_then_diagnoses_files_then_reveals_the_truth(table, tmp_path, stub, capsys, monkeypatch):
+    joints = helpers_report.JOINTS
+    channels = {kind: table[[f"{kind}.{joint}" for joint in joints]].to_numpy() for kind in ("q", "tau")}
+    hidden = {
+        "effect": "stribeck_friction",
+        "joints": ["joint2"],
+        "parameters": {"static": {"value": 13.0, "unit": "N m"}},
+    }
+    case = types.SimpleNamespace(
+        recordings=[
+            irb140_jax.recordings.Recording(t=table["t"].to_numpy(), joint_names=joints, source=name, **channels)
+            for name in ("fast", "slow")
+        ],
+        truth={"schema": 1, "effects": [hidden]},
+        seal="5ea1" * 16,
+    )
+    import irb140_jax.recordings.conceal as conceal
+
+    monkeypatch.setattr(conceal, "demo_case", lambda seed: case)
+    out = tmp_path / "demo"
+    for _ in range(2):  # the second time in place of the first
+        assert cli.main(["demo", "--seed", "3", "--out", str(out)]) == 0
+        said = capsys.readouterr().out
+        assert 0 <= said.index(case.seal) < said.index("Physics left out") < said.index("The truth, now revealed")
+    names = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
+    assert names == {
+        "diagnosis.json", "model.json", "report.html", "truth.json", "recordings/fast.csv", "recordings/slow.csv",
+    }  # fmt: skip
+    assert json.loads((out / "truth.json").read_text())["effects"] == [hidden]
+    assert "What was hidden, what was found" in (out / "report.html").read_text(encoding="utf-8")
+    np.testing.assert_allclose(stub["recordings"][0].q, channels["q"], atol=1e-8)  # read back from the file
