@@ -250,7 +250,7 @@ def _show(result: "Result", out: pathlib.Path) -> None:
     from irb140_jax.report import print_diagnosis
 
     console = _console()
-    print_diagnosis(result.diagnosis, console)
+    print_diagnosis(result.diagnosis, result.views, console)
     console.print(f"Report: {out / 'report.html'}", soft_wrap=True)
 
 

@@ -58,7 +58,7 @@ def page(diagnosis, views) -> Page:
 def printed(diagnosis) -> str:
     """What the terminal would show, with white space made even."""
     console = Console(file=io.StringIO(), width=160)
-    print_diagnosis(diagnosis, console)
+    print_diagnosis(diagnosis, helpers_report.example_views(), console)
     return re.sub(r"\s+", " ", console.file.getvalue())  # pyright: ignore[reportAttributeAccessIssue]
 
 

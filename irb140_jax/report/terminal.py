@@ -1,6 +1,6 @@
 """The diagnosis in plain language on a terminal."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from rich import box
 from rich.console import Console
@@ -19,30 +19,23 @@ VERDICT_COLOURS = {
 }
 
 
-def print_diagnosis(diagnosis: Mapping, console: Console) -> None:
-    """Print verdict, findings and fit of a diagnosis."""
+def print_diagnosis(diagnosis: Mapping, views: Mapping, console: Console) -> None:
+    """Print verdict, findings and fit of a diagnosis; the views give the units of the joints' torque."""
     title, sentence = text.VERDICTS.get(diagnosis["verdict"], (text.words(diagnosis["verdict"]), ""))
     colour = VERDICT_COLOURS.get(diagnosis["verdict"], "default")
     joints = list(diagnosis["fit"])
     console.print()
     console.print(f"[bold {colour}]{title}.[/] {sentence}")
     console.print(escape(diagnosis["summary"]))
-    if diagnosis["findings"]:
-        console.print()
-        console.print(_findings(diagnosis["findings"], joints))
-    for finding in diagnosis["findings"]:
-        console.print(f"  {escape(finding['where'])}", style="dim")
-        for other in finding["alternatives"]:
-            name, share = text.words(other["effect"]), text.percent(other["probability"])
-            console.print(f"  It may also be {name} ({share}). To separate them: {escape(other['separate_by'])}")
-    for rest in diagnosis["unexplained"]:
-        names, share = text.joint_list(rest["joints"], joints), text.percent(rest["share"])
-        console.print(f"  [bold]Unexplained[/] on {escape(names)} ({share} of what is left): {escape(rest['where'])}")
     console.print()
-    console.print(_fit(diagnosis["fit"]))
+    if diagnosis["findings"]:
+        console.print(_findings(diagnosis["findings"], joints))
+    for sentence in (*_where(diagnosis["findings"]), *_unexplained(diagnosis["unexplained"], joints)):
+        console.print(Padding(sentence, (0, 0, 0, 2)))
+    console.print(_fit(diagnosis["fit"], views))
     if diagnosis["not_testable"]:
         names = dict.fromkeys(text.words(blind["effect"]) for blind in diagnosis["not_testable"])
-        console.print(f"This motion could not have shown everywhere: {', '.join(names)}. The report says what would.")
+        console.print(f"Not testable with this motion, on some joints or all: {', '.join(names)}.")
 
 
 def print_reveal(reveal: Reveal, console: Console) -> None:
@@ -63,7 +56,7 @@ def print_reveal(reveal: Reveal, console: Console) -> None:
     console.print(table)
 
 
-def _findings(findings: list[Mapping], joints: list[str]) -> Padding:
+def _findings(findings: Sequence[Mapping], joints: Sequence[str]) -> Table:
     """One row per parameter of each finding."""
     heads = ("left out", "joints", "parameter", _right("value"), "unit", _right("probability"))
     table = Table(*heads, box=box.SIMPLE_HEAD)
@@ -73,16 +66,33 @@ def _findings(findings: list[Mapping], joints: list[str]) -> Padding:
         for name, p in finding["parameters"].items():
             table.add_row(*head, text.words(name), text.with_std(p["value"], p["std"]), p["unit"], tail)
             head, tail = ["", ""], ""
-    return Padding(table, 0)
+    return table
 
 
-def _fit(fit: Mapping) -> Table:
+def _where(findings: Sequence[Mapping]) -> Iterator[str]:
+    """Where each finding acts, and what else it may be."""
+    for finding in findings:
+        yield f"[bold]{text.words(finding['effect']).capitalize()}[/]: {escape(finding['where'])}"
+        for other in finding["alternatives"]:
+            name, share = text.words(other["effect"]), text.percent(other["probability"])
+            yield f"  It may also be {name} ({share}). To separate them: {escape(other['separate_by'])}"
+
+
+def _unexplained(rests: Sequence[Mapping], joints: Sequence[str]) -> Iterator[str]:
+    """What has no name."""
+    for rest in rests:
+        names, share = escape(text.joint_list(rest["joints"], joints)), text.percent(rest["share"])
+        yield f"[bold]Unexplained[/] on {names} ({share} of what is left): {escape(rest['where'])}"
+
+
+def _fit(fit: Mapping, views: Mapping) -> Table:
     """Torque error of each model on unseen data."""
     heads = [_right(name) for name in ("model as given", "refit", "corrected", "noise floor")]
-    table = Table("torque error on unseen data", *heads, box=box.SIMPLE_HEAD)
+    table = Table("torque error on unseen data", *heads, "unit", box=box.SIMPLE_HEAD)
     for joint, row in fit.items():
         keys = ("rmse_nominal", "rmse_refit", "rmse_corrected", "noise_floor")
-        table.add_row(escape(joint), *(text.number(row[key]) for key in keys))
+        unit = views.get("maps", {}).get(joint, {}).get("unit", "")
+        table.add_row(escape(joint), *(text.number(row[key]) for key in keys), unit)
     return table
 
 
