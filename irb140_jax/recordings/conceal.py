@@ -6,40 +6,23 @@ sealed by its hash before anyone sees the recordings, so that a diagnosis can be
 
 import dataclasses
 import hashlib
-import importlib.resources
 import json
-import math
 import pathlib
 from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
-from irb140_jax.errors import InputError
-from irb140_jax.recordings.concealed.catalogue import FIRST_NINE, hidden_kind
+from irb140_jax.recordings.concealed.catalogue import FIRST_NINE
+from irb140_jax.recordings.concealed.choice import Concealment as Concealment
+from irb140_jax.recordings.concealed.choice import chosen, meaningful_sites
 from irb140_jax.recordings.concealed.closed_loop import Log, closed_loop
 from irb140_jax.recordings.concealed.hidden import Hidden, Survey, survey_of
-from irb140_jax.recordings.concealed.plant import arm_model, arm_spec, perturb_inertials
+from irb140_jax.recordings.concealed.plant import arm_model, arm_spec, perturb_inertials, rigid_torque
+from irb140_jax.recordings.concealed.random_robot import random_robot as random_robot
 from irb140_jax.recordings.excite import Excitation, three_motions
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.robot import robot_from_model
-
-
-@dataclasses.dataclass(frozen=True)
-class Concealment:
-    """One effect to hide.
-
-    Attributes:
-        effect: Its name in the vocabulary.
-        joints: The joints it acts on, by name; all of them for effects that act everywhere, then best left empty.
-        share: RMS of its torque as a share of the joint's torque RMS.
-        parameters: Parameters given instead of drawn; when all are given, `share` is not used.
-    """
-
-    effect: str
-    joints: tuple[str, ...] = ()
-    share: float = 0.1
-    parameters: dict[str, float] = dataclasses.field(default_factory=dict)
+from irb140_jax.robot import irb140_path, robot_from_model
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,7 +68,8 @@ class ConcealedCase:
     Attributes:
         recordings: What the diagnosis gets.
         robot_source: The nominal model: path of an MJCF file, or MJCF text.
-        truth: What was hidden: effects, joints, parameters with units, shares.
+        truth: What was hidden: effects, joints, parameters with units, shares; how much of each joint's torque is
+            left out by the true rigid arm in the end (`left_out`); true masses.
         seal: SHA-256 of the truth, fit to be published before the diagnosis.
         secret: What a judge may look at besides.
     """
@@ -127,7 +111,7 @@ def conceal(
     dt = float(motions[0].t[1] - motions[0].t[0])
     nominal, rigid = arm_model(spec, dt), _true_model(mjcf, (), robot.joint_names, dt, inertial_error, seed)
     survey = survey_of(rigid, motions, every=max(1, round(0.01 / dt)))
-    hidden = tuple(_resolved(c, survey, robot.joint_names, seed, k) for k, c in enumerate(concealments))
+    hidden = tuple(chosen(c, survey, robot.joint_names, seed, k) for k, c in enumerate(concealments))
     true = _true_model(mjcf, hidden, robot.joint_names, dt, inertial_error, seed)
     logs = tuple(closed_loop(nominal, true, hidden, motion, recording=k) for k, motion in enumerate(motions))
     noise = noise or Noise()
@@ -137,14 +121,16 @@ def conceal(
         _recording(log, motion.name, robot.joint_names, survey, noise, step, with_speeds, rng)
         for log, motion, rng in zip(logs, motions, rngs, strict=True)
     )
+    left_out = left_out_share(rigid, logs, every=max(1, round(0.02 / dt)))
     truth = {
         "schema": 1, "seed": seed, "inertial_error": inertial_error,
         "effects": [
             {**h.told(robot.joint_names, robot.is_slide), "share": h.share(survey)} for h in hidden
         ],
+        "left_out": dict(zip(robot.joint_names, left_out.tolist(), strict=True)),
         "link_masses": {
-            true.body(int(b)).name or f"body {b}": {"nominal": float(nominal.body_mass[b]),
-                                                    "true": float(rigid.body_mass[b])}
+            nominal.body(int(b)).name or f"body {b}": {"nominal": float(nominal.body_mass[b]),
+                                                       "true": float(rigid.body_mass[b])}
             for b in nominal.jnt_bodyid
         },
     }
@@ -171,15 +157,19 @@ def clean_case(seed: int, *, duration: float = 20.0, rate: float = 1000.0) -> Co
     return _irb140_case(seed, duration, rate, clean=True)
 
 
+def left_out_share(rigid: mujoco.MjModel, logs: Sequence[Log], every: int = 1) -> np.ndarray:
+    """What hides in the logs besides the true rigid arm: RMS, as a share of the rigid arm's torque RMS, shape (n,)."""
+    rigid_squares, squares = np.zeros(rigid.nv), np.zeros(rigid.nv)
+    for log in logs:
+        tau = rigid_torque(rigid, log.q[::every], log.qd[::every], log.qdd[::every])
+        rigid_squares += np.sum(tau**2, axis=0)
+        squares += np.sum((log.tau[::every] - tau) ** 2, axis=0)
+    return np.sqrt(squares / np.maximum(rigid_squares, 1e-300))
+
+
 def seal(truth: dict) -> str:
     """SHA-256 of the truth, written as JSON with sorted keys."""
     return hashlib.sha256(json.dumps(truth, sort_keys=True).encode()).hexdigest()
-
-
-def irb140_path() -> pathlib.Path:
-    """The IRB 140 model that ships with the package, or that of the source tree."""
-    shipped = pathlib.Path(str(importlib.resources.files("irb140_jax"))) / "assets" / "irb140.xml"
-    return shipped if shipped.exists() else shipped.parents[2] / "assets" / "irb140.xml"
 
 
 def _irb140_case(seed: int, duration: float, rate: float, *, clean: bool) -> ConcealedCase:
@@ -198,62 +188,6 @@ def _irb140_case(seed: int, duration: float, rate: float, *, clean: bool) -> Con
             Concealment(effect, tuple(robot.joint_names[j] for j in joints), share=float(rng.uniform(0.06, 0.2)))
         ]
     return conceal(path, concealments, motions, seed=seed)
-
-
-def meaningful_sites(effect: str, survey: Survey) -> list[tuple[int, ...]]:
-    """Joints on which an effect is something of its own, not another effect under its name.
-
-    A torque gain or load-dependent friction on a joint that carries nothing but its own rotor is, in any data, a
-    rotor inertia or Coulomb friction.  A coupling is felt on both joints only where their torques are comparable.
-
-    Args:
-        effect: Name in the vocabulary.
-        survey: What the nominal arm does.
-
-    Returns:
-        Groups of joint indices, never empty.
-    """
-    n = survey.q.shape[1]
-    if hidden_kind(effect).joints_acted_on == 0:
-        return [tuple(range(n))]
-    if hidden_kind(effect).joints_acted_on == 2:
-        pairs = [(j, j + 1) for j in range(n - 1) if survey.is_slide(j) == survey.is_slide(j + 1)]
-        if not pairs:
-            raise InputError(f"{effect} needs two neighbouring joints of one kind; this robot has none")
-        ratio = [abs(math.log(survey.rms(i) / survey.rms(j))) for i, j in pairs]
-        near = [pair for pair, r in zip(pairs, ratio, strict=True) if r < math.log(6.0)]
-        return near or [pairs[int(np.argmin(ratio))]]
-    own = np.array([_own_share(survey, j) for j in range(n)])
-    if effect in ("torque_gain", "rotor_inertia"):
-        carrying = [(j,) for j in range(n) if own[j] > 0.15]
-        return carrying or [(int(np.argmax(own)),)]
-    return [(j,) for j in range(n)]
-
-
-def _own_share(survey: Survey, joint: int) -> float:
-    """Share of a joint's torque (RMS) that is not in proportion to its own acceleration."""
-    tau, qdd = survey.load[:, joint], survey.qdd[:, joint]
-    rest = tau - qdd * (tau @ qdd) / max(float(qdd @ qdd), 1e-300)
-    return float(np.linalg.norm(rest) / max(float(np.linalg.norm(tau)), 1e-300))
-
-
-def _resolved(concealment: Concealment, survey: Survey, names: Sequence[str], seed: int, k: int) -> Hidden:
-    """The effect with its joints looked up, its shapes drawn and its amplitude set."""
-    kind = hidden_kind(concealment.effect)
-    rng = np.random.default_rng([seed, 10, k])
-    for name in concealment.joints:
-        if name not in names:
-            raise InputError(f"{concealment.effect}: no joint {name!r}; the robot has {', '.join(names)}")
-    if set(concealment.parameters) - set(kind.units):
-        raise InputError(f"{concealment.effect}: parameters are {', '.join(kind.units)}; "
-                         f"got {', '.join(concealment.parameters)}")
-    joints = tuple(list(names).index(name) for name in concealment.joints)
-    if kind.joints_acted_on == 0:
-        joints = tuple(range(len(names)))
-    elif len(joints) != kind.joints_acted_on:
-        raise InputError(f"{concealment.effect} acts on {kind.joints_acted_on} joint(s); got {len(joints)}")
-    drawn = kind.drawn(joints, concealment.share, survey, rng)
-    return kind(joints, {**drawn.parameters, **concealment.parameters})
 
 
 def _true_model(

@@ -35,10 +35,11 @@ def closed_loop(
     n, steps = nominal.nv, motion.t.size
     true = copy.copy(true)  # effects change friction levels as they go; the next recording starts afresh
     plant = Plant(true, [nominal.joint(i).name for i in range(n)], recording)
+    control, data, dofs = mujoco.MjData(nominal), plant.data, plant.dofs
+    data.qpos[plant.qpos] = motion.q[0]
     for effect in hidden:
         effect.begin(plant)
-    control, data, dofs = mujoco.MjData(nominal), plant.data, plant.dofs
-    data.qpos[plant.qpos] = motion.q[0] - plant.zero
+    data.qpos[plant.qpos] -= plant.zero
     mujoco.mj_forward(true, data)
     kp, kd = BANDWIDTH**2, 2.0 * BANDWIDTH
     wanted = motion.qdd + kp * motion.q + kd * motion.qd

@@ -13,7 +13,7 @@ from irb140_jax.errors import InputError
 from irb140_jax.recordings.concealed.hidden import Hidden, Plant, Survey
 from irb140_jax.recordings.concealed.plant import rigid_torque
 
-DAMPING_RATIO = 0.1  # of the link on its transmission; with less, this controller keeps the link swinging
+DAMPING_RATIO = 0.05  # of the link on its transmission, the order seen in gear units
 
 
 class _TwoSided(Hidden):
@@ -42,7 +42,7 @@ class _TwoSided(Hidden):
 
 
 class Elasticity(_TwoSided):
-    """tau = K (q_motor - q_link); no softer than a mode of the link at 10 Hz."""
+    """tau = K (q_motor - q_link); no softer than a mode of the link at 8 Hz."""
 
     slug = "joint_elasticity"
     units = {"stiffness": "{tau}/{q}"}
@@ -54,7 +54,7 @@ class Elasticity(_TwoSided):
         reference = inertia * (2.0 * math.pi * 20.0) ** 2
         unit = cls(joints, {"stiffness": reference})
         wanted = reference * unit.share(survey) / max(share, 1e-12)
-        return cls(joints, {"stiffness": max(wanted, inertia * (2.0 * math.pi * 10.0) ** 2)})
+        return cls(joints, {"stiffness": max(wanted, inertia * (2.0 * math.pi * 8.0) ** 2)})
 
     def torque(self, survey: Survey):
         j = self.joint
@@ -74,16 +74,13 @@ class Elasticity(_TwoSided):
         plant.model.jnt_stiffness[self._joint.id] = self.parameters["stiffness"]
         plant.model.dof_damping[self._inner[1]] = self._damping
         # Bent by the load from the start, as it would be after standing still.
-        data = mujoco.MjData(plant.model)
-        data.qpos[:] = plant.data.qpos
-        mujoco.mj_forward(plant.model, data)
-        plant.data.qpos[self._inner[0]] = -data.qfrc_bias[self._inner[1]] / self.parameters["stiffness"]
+        plant.data.qpos[self._inner[0]] = -plant.data.qfrc_bias[self._inner[1]] / self.parameters["stiffness"]
 
 
 class Backlash(_TwoSided):
     """A dead zone of full width `gap` between motor and link, hard beyond it: a mode of the link at 30 Hz.
 
-    Its torque has no size of its own, so the gap is set directly: 0.1 rad (or 0.1 m) times the share.
+    Its torque has no size of its own, so the gap is set directly: up to 0.02 rad (or m) times the share.
     """
 
     slug = "backlash"
@@ -92,7 +89,7 @@ class Backlash(_TwoSided):
 
     @classmethod
     def drawn(cls, joints, share, survey, rng):
-        return cls(joints, {"gap": 0.1 * share * rng.uniform(0.5, 1.0)})
+        return cls(joints, {"gap": 0.02 * share * rng.uniform(0.5, 1.0)})
 
     def torque(self, survey: Survey):
         j, moved = self.joint, survey.q.copy()
@@ -104,6 +101,10 @@ class Backlash(_TwoSided):
         inertia = inner_inertia(plant, self._inner[1])
         self._stiffness = inertia * (2.0 * math.pi * 30.0) ** 2
         self._damping = 0.3 * inertia * 2.0 * math.pi * 30.0
+        # On the flank that the load presses against, as it would be after standing still.
+        load = plant.data.qfrc_bias[self._inner[1]]
+        slack = math.copysign(0.5 * self.parameters["gap"], load)
+        plant.data.qpos[self._inner[0]] = -slack - load / self._stiffness
 
     def act(self, plant: Plant):
         position, speed = plant.data.qpos[self._inner[0]], plant.data.qvel[self._inner[1]]
