@@ -1,25 +1,43 @@
 """A robot as scalars: what the recursions of this folder run on, and what of it is known at trace time."""
 
 import itertools
+from collections import OrderedDict
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from irb140_jax.dynamics.regroup import regrouping
 from irb140_jax.dynamics.scalars import Matrix, Number, Vector
 from irb140_jax.robot import Robot
 
 # An entry this close to 0, 1 or -1 is taken to be it: the round-off of rotations that a model file gives as angles.
 SNAP = 1e-15
+# Plans kept; more than the robots that one program works on at a time.
+KEPT = 64
 
-Structure = tuple[float | None, ...]
-"""For each entry of `packed`: 0, 1 or -1 if it is known to be that, else None."""
+Known = tuple[float | None, ...]
+
+
+class Plan(eqx.Module):
+    """What a robot's geometry says before any sample is seen.
+
+    Attributes:
+        known: For each number of `numbers`, 0, 1 or -1 if it is that for sure, else None.
+        regroup: Map of the inertial parameters onto fewer of the same torques; None if the geometry is traced.
+        is_slide: True for prismatic joints.
+    """
+
+    known: Known = eqx.field(static=True)
+    regroup: Float[Array, "10*n 10*n"] | None
+    is_slide: tuple[bool, ...] = eqx.field(static=True)
 
 
 class Link(NamedTuple):
-    """One link in scalars; the fields are those of `Robot`, the last three are `Robot.phi`."""
+    """One link in scalars: the fields of `Robot`; mass, first moment and inertia are those of `Robot.phi`."""
 
     rotation: Matrix
     position: Vector
@@ -38,38 +56,54 @@ class Chain(NamedTuple):
     gravity: Vector
 
 
-def packed(robot: Robot) -> Float[Array, " k"]:
-    """Every number that rigid-body dynamics needs, in one vector: 26 a link, then gravity."""
-    n = robot.n
-    links = (robot.rotation.reshape(n, 9), robot.position, robot.axis, robot.reference[:, None], robot.phi)
-    return jnp.concatenate([jnp.concatenate(links, axis=1).ravel(), robot.gravity])
+_plans: OrderedDict[tuple, tuple[tuple, Plan]] = OrderedDict()
 
 
-def structure(robot: Robot) -> Structure:
-    """What is known of `packed`: the zeros and ones of the geometry if the robot is concrete, nothing if it is traced.
+def plan(robot: Robot, regrouped: bool = True) -> Plan:
+    """What can be known of the robot: the zeros and ones of its geometry if that is concrete, nothing if it is traced.
 
     Inertial parameters count as unknown, so that a refitted robot does not make XLA compile again.
     """
     geometry = (robot.rotation, robot.position, robot.axis, robot.reference, robot.gravity)
-    per_link = 26
     if any(isinstance(x, jax.core.Tracer) for x in geometry):
-        return (None,) * (per_link * robot.n + 3)
-    rotation, position, axis, reference, gravity = (np.asarray(x) for x in geometry)
+        return Plan((None,) * (26 * robot.n + 3), None, robot.is_slide)
+    key = (*map(id, geometry), robot.is_slide, regrouped)
+    if key not in _plans:
+        # The arrays are kept beside their plan, so that their ids can't pass to others.
+        _plans[key] = (geometry, _plan(robot, regrouped))
+        if len(_plans) > KEPT:
+            _plans.popitem(last=False)
+    return _plans[key][1]
+
+
+def _plan(robot: Robot, regrouped: bool) -> Plan:
+    rotation, position, axis = (np.asarray(x) for x in (robot.rotation, robot.position, robot.axis))
+    reference, gravity = np.asarray(robot.reference), np.asarray(robot.gravity)
+    regroup, gone = regrouping(rotation, position, axis, robot.is_slide)
     known: list[float | None] = []
     for i in range(robot.n):
-        for x in (*rotation[i].ravel(), *position[i], *axis[i], reference[i]):
-            known.append(_snapped(float(x)))
-        known.extend([None] * 10)
-    return (*known, *(_snapped(float(x)) for x in gravity))
+        known.extend(_snapped(x) for x in (*rotation[i].ravel(), *position[i], *axis[i], reference[i]))
+        known.extend(0.0 if regrouped and zero else None for zero in gone[i])
+    known.extend(_snapped(x) for x in gravity)
+    with jax.ensure_compile_time_eval():
+        return Plan(tuple(known), jnp.asarray(regroup) if regrouped else None, robot.is_slide)
 
 
 def _snapped(x: float) -> float | None:
     return next((value for value in (0.0, 1.0, -1.0) if abs(x - value) <= SNAP), None)
 
 
-def chain(numbers: Float[Array, " k"], known: Structure, is_slide: tuple[bool, ...]) -> Chain:
-    """The links in scalars, out of `packed` and `structure`."""
-    entries = [x if k is None else k for x, k in zip(jnp.unstack(numbers), known, strict=True)]
+def numbers(robot: Robot, ahead: Plan) -> Float[Array, " k"]:
+    """Every number that rigid-body dynamics needs, in one vector: 26 a link, then gravity."""
+    n = robot.n
+    phi = robot.phi if ahead.regroup is None else (ahead.regroup @ robot.phi.ravel()).reshape(n, 10)
+    links = (robot.rotation.reshape(n, 9), robot.position, robot.axis, robot.reference[:, None], phi)
+    return jnp.concatenate([jnp.concatenate(links, axis=1).ravel(), robot.gravity])
+
+
+def chain(robot: Robot, ahead: Plan) -> Chain:
+    """The links in scalars."""
+    entries = [x if k is None else k for x, k in zip(jnp.unstack(numbers(robot, ahead)), ahead.known, strict=True)]
     take = iter(entries)
 
     def vector() -> Vector:
@@ -77,7 +111,7 @@ def chain(numbers: Float[Array, " k"], known: Structure, is_slide: tuple[bool, .
         return (x, y, z)
 
     links = []
-    for slides in is_slide:
+    for slides in ahead.is_slide:
         rotation = (vector(), vector(), vector())
         position, axis, reference, mass, first = vector(), vector(), next(take), next(take), vector()
         xx, xy, xz, yy, yz, zz = itertools.islice(take, 6)

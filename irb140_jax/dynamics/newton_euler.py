@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
 
-from irb140_jax.dynamics.chain import Chain, Link, Structure, chain, packed, structure
+from irb140_jax.dynamics.chain import Chain, Link, Plan, chain, plan
 from irb140_jax.dynamics.passive import passive_torque
 from irb140_jax.dynamics.scalars import (
     ZERO,
@@ -22,9 +23,13 @@ from irb140_jax.dynamics.scalars import (
     sub,
     transpose,
     turn,
-)  # fmt: skip
+)
+from irb140_jax.dynamics.stage import always, staged
+from irb140_jax.dynamics.trig import sincos
 from irb140_jax.robot import Robot
 from irb140_jax.types import Joints
+
+Wrench = tuple[Vector, Vector]
 
 
 class Placement(NamedTuple):
@@ -54,12 +59,18 @@ class Motion(NamedTuple):
     linear: Vector
 
 
-def placement(link: Link, q: Number) -> Placement:
-    """Where joint coordinate q puts the link."""
-    angle = sub(q, link.reference)
-    if link.is_slide:
-        return Placement(link, 1.0, 0.0, plus(link.position, apply(link.rotation, scale(angle, link.axis))))
-    return Placement(link, jnp.cos(angle), jnp.sin(angle), link.position)
+def placements(arm: Chain, q: list[Number]) -> list[Placement]:
+    """Where the joint coordinates put each link on its parent."""
+    result = []
+    for link, coordinate in zip(arm.links, q, strict=True):
+        angle = sub(coordinate, link.reference)
+        if link.is_slide:
+            offset = apply(link.rotation, scale(angle, link.axis))
+            result.append(Placement(link, 1.0, 0.0, plus(link.position, offset)))
+        else:
+            sine, cosine = sincos(jnp.asarray(angle))
+            result.append(Placement(link, cosine, sine, link.position))
+    return result
 
 
 def next_motion(place: Placement, parent: Motion, qd: Number, qdd: Number) -> Motion:
@@ -88,28 +99,39 @@ def link_wrench(link: Link, motion: Motion) -> tuple[Vector, Vector]:
     return force, moment
 
 
-def outward(arm: Chain, q: list[Number], qd: list[Number], qdd: list[Number]) -> tuple[list[Placement], list[Motion]]:
-    """Placements and motions of all links, base to tip."""
+def outward(
+    arm: Chain, q: list[Number], qd: list[Number], qdd: list[Number], predicate: Bool[Array, ""]
+) -> tuple[list[Placement], list[Motion]]:
+    """Placements and motions of all links, base to tip; the predicate is for `staged`."""
+    stored = staged(predicate, lambda: [place[1:] for place in placements(arm, q)])
+    places = [Placement(link, *place) for link, place in zip(arm.links, stored, strict=True)]
     motion = Motion(ZERO, ZERO, scale(-1.0, arm.gravity))
-    places, motions = [], []
-    for i, link in enumerate(arm.links):
-        places.append(placement(link, q[i]))
-        motion = next_motion(places[i], motion, qd[i], qdd[i])
+    motions = []
+    for place, *rates in zip(places, qd, qdd, strict=True):
+        motion = staged(predicate, partial(next_motion, place, motion, *rates))
         motions.append(motion)
     return places, motions
 
 
-def inward(places: list[Placement], motions: list[Motion]) -> list[Number]:
+def inward(places: list[Placement], motions: list[Motion], predicate: Bool[Array, ""]) -> list[Number]:
     """Joint torques from the motions, tip to base."""
-    force, moment = ZERO, ZERO
+    wrench: Wrench = (ZERO, ZERO)
     torques: list[Number] = []
     for i in reversed(range(len(places))):
-        own_force, own_moment = link_wrench(places[i].link, motions[i])
-        force, moment = plus(force, own_force), plus(moment, own_moment)
-        torques.append(dot(places[i].link.axis, force if places[i].link.is_slide else moment))
-        force, moment = places[i].to_parent(force), places[i].to_parent(moment)
-        moment = minus(moment, cross(force, places[i].position))
+        outer = places[i + 1] if i + 1 < len(places) else None
+        wrench = staged(predicate, partial(_carried_wrench, places[i].link, motions[i], outer, wrench))
+        torques.append(dot(places[i].link.axis, wrench[0] if places[i].link.is_slide else wrench[1]))
     return torques[::-1]
+
+
+def _carried_wrench(link: Link, motion: Motion, outer: Placement | None, wrench: Wrench) -> Wrench:
+    """Wrench that the link's joint carries: the link's own and that of the next joint."""
+    force, moment = link_wrench(link, motion)
+    if outer is None:
+        return force, moment
+    passed = outer.to_parent(wrench[0])
+    arm = minus(outer.to_parent(wrench[1]), cross(passed, outer.position))
+    return plus(force, passed), plus(moment, arm)
 
 
 def inverse_dynamics(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Joints:
@@ -127,12 +149,17 @@ def inverse_dynamics(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Joints
     Source: Luh, Walker, Paul (1980); inertial parameters about the link's origin as in Khalil, Dombre, Modeling,
         Identification and Control of Robots (2002), sec. 9.5.
     """
-    rigid = _rigid_torque(packed(robot), structure(robot), robot.is_slide, q, qd, qdd)
+    return _inverse_dynamics(robot, plan(robot), q, qd, qdd)
+
+
+@jax.jit
+def _inverse_dynamics(robot: Robot, ahead: Plan, q: Joints, qd: Joints, qdd: Joints) -> Joints:
+    rigid = rigid_torque(chain(robot, ahead), q, qd, qdd)
     return rigid + robot.armature * qdd + passive_torque(robot, q, qd)
 
 
-@partial(jax.jit, static_argnums=(1, 2))
-def _rigid_torque(numbers, known: Structure, is_slide: tuple[bool, ...], q, qd, qdd):
-    arm = chain(numbers, known, is_slide)
-    torques = inward(*outward(arm, list(q), list(qd), list(qdd)))
+def rigid_torque(arm: Chain, q: Float[Array, "n *T"], qd: Float[Array, "n *T"], qdd: Float[Array, "n *T"]):
+    """Torques of the rigid bodies alone, shape (n,) for one sample, (n, T) for a batch."""
+    predicate = always(q, qd, qdd)
+    torques = inward(*outward(arm, list(q), list(qd), list(qdd), predicate), predicate)
     return jnp.stack([jnp.broadcast_to(jnp.asarray(x, q.dtype), q.shape[1:]) for x in torques])

@@ -1,16 +1,18 @@
 """The regressor: rigid-body torques are linear in the inertial parameters, tau = Y(q, qd, qdd) phi."""
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from irb140_jax.dynamics.chain import Chain, Structure, chain, packed, structure
+from irb140_jax.dynamics.chain import Chain, Plan, chain, plan
+from irb140_jax.dynamics.chunks import in_chunks
 from irb140_jax.dynamics.newton_euler import Motion, Placement, outward
 from irb140_jax.dynamics.scalars import ZERO, Number, Vector, add, cross, dot, minus, mul, plus
+from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.robot import Robot
 from irb140_jax.types import Joints, JointSamples
+
+Blocks = dict[tuple[int, int], list[Number]]
 
 
 def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, "n 10*n"]:
@@ -27,41 +29,40 @@ def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, 
 
     Source: Atkeson, An, Hollerbach (1986), Estimation of inertial parameters of manipulator loads and links.
     """
-    return _regressor(packed(robot), structure(robot), robot.is_slide, q, qd, qdd)
+    return _regressor(robot, plan(robot, regrouped=False), q, qd, qdd)
 
 
-def regressor_batch(
-    robot: Robot, q: JointSamples, qd: JointSamples, qdd: JointSamples
-) -> Float[Array, "T n 10*n"]:
+def regressor_batch(robot: Robot, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> Float[Array, "T n 10*n"]:
     """`regressor` of T samples, arrays of shape (T, n) -> (T, n, 10 n)."""
-    Y = _regressor(packed(robot), structure(robot), robot.is_slide, q.T, qd.T, qdd.T)
-    return jnp.moveaxis(Y, -1, 0)
+    return in_chunks(_regressor_of_chunk, (robot, plan(robot, regrouped=False)), (q, qd, qdd))
 
 
-@partial(jax.jit, static_argnums=(1, 2))
-def _regressor(numbers, known: Structure, is_slide: tuple[bool, ...], q, qd, qdd):
-    arm = chain(numbers, known, is_slide)
-    blocks = regressor_blocks(arm, list(q), list(qd), list(qdd))
-    n, zero = len(is_slide), jnp.zeros(q.shape[1:], q.dtype)
-    rows = []
-    for j in range(n):
-        entries = [x for i in range(n) for x in (blocks[j, i] if i >= j else [0.0] * 10)]
-        rows.append(jnp.stack([zero if isinstance(x, float) and x == 0.0 else x + zero for x in entries]))
-    return jnp.stack(rows)
+def _regressor_of_chunk(given: tuple[Robot, Plan], q: JointSamples, qd: JointSamples, qdd: JointSamples):
+    return jnp.moveaxis(_regressor(*given, q.T, qd.T, qdd.T), -1, 0)
+
+
+@jax.jit
+def _regressor(robot: Robot, ahead: Plan, q, qd, qdd):
+    blocks = regressor_blocks(chain(robot, ahead), q, qd, qdd)
+    none: list[Number] = [0.0] * 10
+    filled = lambda x: jnp.broadcast_to(jnp.asarray(x, q.dtype), q.shape[1:])  # noqa: E731
+    rows = [[filled(x) for i in range(robot.n) for x in blocks.get((j, i), none)] for j in range(robot.n)]
+    return jnp.stack([jnp.stack(row) for row in rows])
 
 
 def regressor_blocks(
-    arm: Chain, q: list[Number], qd: list[Number], qdd: list[Number]
-) -> dict[tuple[int, int], list[Number]]:
-    """Ten scalars Y[j, i] for every joint j and every link i >= j that it carries."""
-    places, motions = outward(arm, q, qd, qdd)
-    blocks = {}
+    arm: Chain, q: Float[Array, "n *T"], qd: Float[Array, "n *T"], qdd: Float[Array, "n *T"]
+) -> Blocks:
+    """Ten scalars Y[j, i] for every joint j and every link i >= j that it carries; shapes (n,) or (n, T)."""
+    predicate = always(q, qd, qdd)
+    places, motions = outward(arm, list(q), list(qd), list(qdd), predicate)
+    blocks: Blocks = {}
     screws: list[tuple[Vector, Vector]] = []
     for i, (place, motion) in enumerate(zip(places, motions, strict=True)):
-        screws = [_carried(place, screw) for screw in screws]
+        screws = staged(predicate, lambda place=place, screws=screws: [_carried(place, x) for x in screws])
         screws.append((ZERO, place.link.axis) if place.link.is_slide else (place.link.axis, ZERO))
-        for j, screw in enumerate(screws):
-            blocks[j, i] = _block(screw, motion)
+        rows = staged(predicate, lambda motion=motion, screws=screws: [_block(x, motion) for x in screws])
+        blocks |= {(j, i): row for j, row in enumerate(rows)}
     return blocks
 
 

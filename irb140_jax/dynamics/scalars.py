@@ -1,6 +1,6 @@
 """Vector algebra written out in scalars, leaving out what is known to be zero or one.
 
-A scalar is a Python float (known when the function is traced) or an array: of shape () for one sample, (T,) for a batch.
+A scalar is a Python float (known when the function is traced) or an array: shape () for one sample, (T,) for a batch.
 Batches last and 3-vectors as three arrays is what XLA vectorises best on a CPU; folding the known zeros and ones of a
 robot's geometry halves the arithmetic.
 """
