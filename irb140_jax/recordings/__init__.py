@@ -1,1 +1,7 @@
-"""To come."""
+"""Recordings: reading, checking, conditioning, excitation, and recordings with concealed physics."""
+
+from irb140_jax.recordings.read import read_recording as read_recording
+from irb140_jax.recordings.recording import Recording as Recording
+from irb140_jax.recordings.recording import recording_columns as recording_columns
+from irb140_jax.recordings.recording import rows_of as rows_of
+from irb140_jax.recordings.recording import write_recording as write_recording

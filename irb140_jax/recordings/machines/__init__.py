@@ -1,0 +1,13 @@
+"""Readers of real machines' published recordings: pure functions, no data."""
+
+from irb140_jax.recordings.machines.dfki_double_pendulum import pendulum_model as pendulum_model
+from irb140_jax.recordings.machines.dfki_double_pendulum import (
+    pendulum_model_with_mistake as pendulum_model_with_mistake,
+)
+from irb140_jax.recordings.machines.dfki_double_pendulum import pendulum_recording as pendulum_recording
+from irb140_jax.recordings.machines.dfki_double_pendulum import pendulum_runs as pendulum_runs
+from irb140_jax.recordings.machines.dfki_double_pendulum import write_pendulum as write_pendulum
+from irb140_jax.recordings.machines.folder import recordings_folder as recordings_folder
+from irb140_jax.recordings.machines.staubli_tx40 import tx40_model as tx40_model
+from irb140_jax.recordings.machines.staubli_tx40 import tx40_recording as tx40_recording
+from irb140_jax.recordings.machines.staubli_tx40 import write_tx40 as write_tx40

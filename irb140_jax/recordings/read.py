@@ -1,0 +1,123 @@
+"""A file to a checked `Recording`: the way in for everything a user measured."""
+
+import dataclasses
+import pathlib
+
+import numpy as np
+
+from irb140_jax.errors import RecordingError
+from irb140_jax.recordings import repair
+from irb140_jax.recordings.check import check_motion, check_times
+from irb140_jax.recordings.check_model import check_against_model
+from irb140_jax.recordings.columns import ColumnMap, closest, read_column_map, renamed, scaled, what_came
+from irb140_jax.recordings.glance import glance
+from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.table import read_table
+from irb140_jax.robot import Robot
+
+
+def read_recording(path: str | pathlib.Path, robot: Robot, columns: str | pathlib.Path | None = None) -> Recording:
+    """Read a recording of this robot from CSV, Parquet or NPZ and check it.
+
+    Args:
+        path: The file; its columns are t, q.<joint>, tau.<joint> and where logged qd.<joint>, qdd.<joint>, SI units.
+        robot: The model of the robot that was recorded; gives the joints' names and what torque is plausible.
+        columns: A TOML file that maps other names and units, see `recordings.columns`.
+
+    Returns:
+        The recording.  Repairs that are safe are made and stated in its `notes`.
+
+    Raises:
+        RecordingError: It can't be used; the message says file, column, row (counted from 1 below the header), what is
+            wrong and what would mend it.
+    """
+    recording = unchecked_recording(pathlib.Path(path), robot.joint_names, columns)
+    recording = repair.unwrapped(repair.without_glitches(recording), robot.is_slide)
+    seen = glance(recording)
+    recording = check_motion(recording, seen, robot)
+    check_against_model(recording, seen, robot)
+    return dataclasses.replace(recording, source=pathlib.Path(path).name)
+
+
+def unchecked_recording(
+    path: pathlib.Path, joint_names: tuple[str, ...], columns: str | pathlib.Path | None = None
+) -> Recording:
+    """The numbers of a file as a `Recording`: complete, finite, in rising time, but its motion and torque not "
+      "checked."""
+    column_map = ColumnMap() if columns is None else read_column_map(columns, joint_names)
+    table, notes = read_table(path, joint_names)
+    table = renamed(table, column_map)
+    wanted = [*([] if column_map.rate and "t" not in table else ["t"]),
+              *(f"{kind}.{joint}" for kind in ("q", "tau") for joint in joint_names)]
+    _require(table, wanted, path)
+    optional = {kind: [f"{kind}.{joint}" for joint in joint_names] for kind in ("qd", "qdd")}
+    complete = {kind: names for kind, names in optional.items() if all(name in table for name in names)}
+    for kind in optional.keys() - complete.keys():
+        missing = [name for name in optional[kind] if name not in table]
+        if len(missing) < len(joint_names):
+            notes.append(f"{kind} is not there for every joint ({missing[0]} is missing), so it is derived from q")
+    used = [*wanted, *(name for names in complete.values() for name in names)]
+    table = scaled(_numbers(table, used, path, notes), column_map)
+    if "t" not in used:
+        used.insert(0, "t")
+    rows = np.arange(1, len(table["t"]) + 1)
+    table, rows = repair.without_repeated_rows(table, rows, notes)
+    table, rows = repair.without_missing_ends(table, used, rows, notes)
+    check_times(table["t"], rows, path, notes)
+    for kind in sorted(complete):
+        # Velocities that are full of holes are worth less than those derived from q.
+        if any(not repair.few_missing(table[name]) for name in complete[kind]):
+            notes.append(f"{kind} has too many missing values; it is derived from q instead")
+            del complete[kind]
+    used = [*wanted, *(name for names in complete.values() for name in names)]
+    table = repair.with_gaps_filled(table, used, rows, path, notes)
+    stacked = lambda names: np.stack([table[name] for name in names], axis=1)  # noqa: E731
+    kept = {"t", *wanted, *(name for names in complete.values() for name in names)}
+    return Recording(
+        t=table["t"], joint_names=joint_names, source=str(path), notes=tuple(notes),
+        q=stacked([f"q.{joint}" for joint in joint_names]), tau=stacked([f"tau.{joint}" for joint in joint_names]),
+        **{kind: stacked(names) for kind, names in complete.items()},
+        extras={name: values for name, values in table.items() if name not in kept},
+    )
+
+
+def _require(table: dict[str, np.ndarray], wanted: list[str], path: pathlib.Path) -> None:
+    missing = [name for name in wanted if name not in table]
+    if missing:
+        names = ", ".join(missing[:8]) + (f" and {len(missing) - 8} more" if len(missing) > 8 else "")
+        raise RecordingError(f"{path}: missing column{'s' if len(missing) > 1 else ''} {names}; "
+                             f"{what_came(table)}{closest(missing[0], set(table) - set(wanted))}; rename them, or map "
+                             "them with --columns FILE.toml")
+
+
+def _numbers(
+    table: dict[str, np.ndarray], used: list[str], path: pathlib.Path, notes: list[str]
+) -> dict[str, np.ndarray]:
+    """Every column as floats, empty cells as NaN; a text in a column that is needed is an error, elsewhere a note."""
+    numbers = {}
+    for name, values in table.items():
+        if values.dtype != object:
+            numbers[name] = np.asarray(values, dtype=float)
+            continue
+        converted, bad = _as_floats(values)
+        if bad is None:
+            numbers[name] = converted
+        elif name in used:
+            raise RecordingError(f"{path}: column {name}, row {bad + 1}: '{values[bad]}' is not a number; write a "
+                                 "decimal number in SI units there, or delete the row")
+        else:
+            notes.append(f"Column {name} holds text and is left out")
+    return numbers
+
+
+def _as_floats(values: np.ndarray) -> tuple[np.ndarray, int | None]:
+    """Floats of an array of objects, and the index of the first that is none."""
+    converted = np.full(len(values), np.nan)
+    for i, value in enumerate(values):
+        if value is None or value != value or (isinstance(value, str) and not value.strip()):
+            continue
+        try:
+            converted[i] = float(value)
+        except (TypeError, ValueError):
+            return converted, i
+    return converted, None

@@ -1,0 +1,95 @@
+"""What a robot's log holds, and how it is written down."""
+
+import dataclasses
+import os
+import pathlib
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from irb140_jax.errors import RecordingError
+
+WRITABLE = (".csv", ".parquet", ".npz")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Recording:
+    """One recording, in SI units, columns in the order of the robot's joints.
+
+    Attributes:
+        t: Time [s], shape (T,), strictly rising; the rate may jitter.
+        q: Joint positions [rad or m], shape (T, n).
+        tau: Logged joint torques [N m or N], shape (T, n).
+        joint_names: Names of the joints, in the order of the columns.
+        qd: Logged joint velocities [rad/s or m/s], shape (T, n); None where they were not logged for every joint.
+        qdd: Logged joint accelerations [rad/s^2 or m/s^2], shape (T, n); None likewise.
+        extras: Every other column by its name, shape (T,); may hold NaN.
+        source: File name, for messages.
+        notes: Repairs made and oddities seen, one plain sentence each.
+    """
+
+    t: Float[np.ndarray, " T"]
+    q: Float[np.ndarray, "T n"]
+    tau: Float[np.ndarray, "T n"]
+    joint_names: tuple[str, ...]
+    qd: Float[np.ndarray, "T n"] | None = None
+    qdd: Float[np.ndarray, "T n"] | None = None
+    extras: dict[str, Float[np.ndarray, " T"]] = dataclasses.field(default_factory=dict)
+    source: str = "recording"
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        shape = (len(self.t), len(self.joint_names))
+        for name in ("q", "tau", "qd", "qdd"):
+            value = getattr(self, name)
+            if value is not None and value.shape != shape:
+                raise RecordingError(f"{self.source}: {name} has shape {value.shape}; allowed is (T, n) = {shape}, one "
+                                     "row a sample and one column a joint")
+
+
+def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Recording:
+    """The samples `rows` of a recording, under the same name unless `source` gives another."""
+    cut = lambda x: None if x is None else x[rows]  # noqa: E731
+    return dataclasses.replace(
+        recording, t=recording.t[rows], q=recording.q[rows], tau=recording.tau[rows], qd=cut(recording.qd),
+        qdd=cut(recording.qdd), extras={k: v[rows] for k, v in recording.extras.items()},
+        source=recording.source if source is None else source,
+    )
+
+
+def recording_columns(recording: Recording) -> dict[str, Float[np.ndarray, " T"]]:
+    """The columns of a recording by their contract names: t, q.<joint>, qd.<joint>, qdd.<joint>, tau.<joint>, "
+      "extras."""
+    columns = {"t": recording.t}
+    for name in ("q", "qd", "qdd", "tau"):
+        value = getattr(recording, name)
+        if value is not None:
+            columns |= {f"{name}.{joint}": value[:, i] for i, joint in enumerate(recording.joint_names)}
+    return columns | recording.extras
+
+
+def write_recording(recording: Recording, path: str | pathlib.Path) -> pathlib.Path:
+    """Write a recording as CSV, Parquet or NPZ, by the suffix of `path`; whole or not at all.
+
+    Raises:
+        RecordingError: The suffix is none of these.
+    """
+    path = pathlib.Path(path)
+    if path.suffix not in WRITABLE:
+        raise RecordingError(f"{path}: can't write a recording as '{path.suffix}'; allowed is {', '.join(WRITABLE)}")
+    columns = recording_columns(recording)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # The suffix must survive: numpy appends its own where it is missing.
+    unfinished = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        if path.suffix == ".npz":
+            np.savez_compressed(unfinished, **columns)  # pyright: ignore[reportArgumentType]
+        elif path.suffix == ".parquet":
+            pd.DataFrame(columns).to_parquet(unfinished, index=False)
+        else:
+            pd.DataFrame(columns).to_csv(unfinished, index=False)
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return path
