@@ -36,8 +36,8 @@ class AsymmetricFriction(AbstractEffect):
     def lowest(self, robot, joints):
         return -np.repeat(np.asarray(robot.frictionloss)[joints], 2)
 
-    def where(self, names, values, unit):
+    def where(self, names, values, units):
         return (
-            f"{names}: {values['coulomb_pos']:.3g} {unit} while moving up, {values['coulomb_neg']:.3g} {unit} "
+            f"{names}: {values['coulomb_pos']:.3g} {units['coulomb_pos']} while moving up, {values['coulomb_neg']:.3g} {units['coulomb_neg']} "
             "while moving down"
         )

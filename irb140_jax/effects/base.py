@@ -24,7 +24,8 @@ class Motion(eqx.Module):
     Attributes:
         t: Time [s], shape (T,).
         q, qd, qdd: Joint positions, velocities, accelerations, shape (T, n).
-        load: Torque of the model along the motion [N m or N], shape (T, n).
+        load: Torque the transmissions carry: rigid body and all but friction [N m or N], shape (T, n).
+        total: Torque the motors give: load and friction [N m or N], shape (T, n).
         rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
     """
 
@@ -33,6 +34,7 @@ class Motion(eqx.Module):
     qd: JointSamples
     qdd: JointSamples
     load: JointSamples
+    total: JointSamples
     rest_speed: Joints
 
     def direction(self) -> JointSamples:
@@ -118,7 +120,7 @@ class AbstractEffect(abc.ABC):
         return np.full(max(max(v) for v in self.variants) + 1, -np.inf)
 
     @abc.abstractmethod
-    def where(self, names: str, values: dict[str, float], unit: str) -> str:
+    def where(self, names: str, values: dict[str, float], units: dict[str, str]) -> str:
         """One sentence: at which positions, speeds, loads, times or frequencies it acts."""
 
     def unit(self, parameter: Parameter, is_slide: bool) -> str:

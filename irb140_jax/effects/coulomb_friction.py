@@ -37,8 +37,8 @@ class CoulombFriction(AbstractEffect):
     def lowest(self, robot, joints):
         return -np.asarray(robot.frictionloss)[joints]
 
-    def where(self, names, values, unit):
-        return f"{names}: a step of +-{values['coulomb']:.3g} {unit} at every reversal of the motion, whatever the speed"
+    def where(self, names, values, units):
+        return f"{names}: a step of +-{values['coulomb']:.3g} {units['coulomb']} at every reversal of the motion, whatever the speed"
 
 
 def dry_friction_columns(motion, joints, second):

@@ -38,8 +38,8 @@ class LoadDependentFriction(AbstractEffect):
     def lowest(self, robot, joints):
         return np.array([-float(robot.frictionloss[joints[0]]), 0.0])
 
-    def where(self, names, values, unit):
+    def where(self, names, values, units):
         return (
             f"{names}: against the motion, {100 * values['load_coefficient']:.3g} % of the transmitted torque "
-            f"on top of {values['coulomb']:.3g}"
+            f"on top of {values['coulomb']:.3g} {units['coulomb']}"
         )

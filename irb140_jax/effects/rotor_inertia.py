@@ -33,5 +33,5 @@ class RotorInertia(AbstractEffect):
     def lowest(self, robot, joints):
         return -np.asarray(robot.armature)[joints]
 
-    def where(self, names, values, unit):
-        return f"{names}: in proportion to the joint's own acceleration, {values['inertia']:.3g} {unit}"
+    def where(self, names, values, units):
+        return f"{names}: in proportion to the joint's own acceleration, {values['inertia']:.3g} {units['inertia']}"

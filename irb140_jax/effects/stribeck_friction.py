@@ -50,8 +50,8 @@ class StribeckFriction(AbstractEffect):
     def lowest(self, robot, joints):
         return np.array([-float(robot.frictionloss[joints[0]]), 0.0])
 
-    def where(self, names, values, unit):
+    def where(self, names, values, units):
         return (
-            f"{names}: below about {values['stribeck_velocity']:.3g} {unit.split()[-1]} "
-            f"friction rises from {values['coulomb']:.3g} to {values['static']:.3g}"
+            f"{names}: below about {values['stribeck_velocity']:.3g} {units['stribeck_velocity']} "
+            f"friction rises from {values['coulomb']:.3g} to {values['static']:.3g} {units['static']}"
         )

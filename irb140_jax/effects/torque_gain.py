@@ -22,7 +22,7 @@ class TorqueGain(AbstractEffect):
     needs = "large gravity torque on this joint that other joints' torques confirm, or a known payload"
 
     def columns(self, motion, joints, shape):
-        return of_site(motion.load, joints)[:, :, None]
+        return of_site(motion.total, joints)[:, :, None]
 
     def physical(self, w, shape):
         return 1.0 / (1.0 + w)
@@ -33,5 +33,5 @@ class TorqueGain(AbstractEffect):
     def lowest(self, robot, joints):
         return np.full(1, -0.9)
 
-    def where(self, names, values, unit):
+    def where(self, names, values, units):
         return f"{names}: in proportion to the joint's whole torque; the real torque is {values['gain']:.3g} x the logged"

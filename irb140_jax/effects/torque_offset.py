@@ -31,5 +31,5 @@ class TorqueOffset(AbstractEffect):
     def amplitudes(self, values):
         return np.array([values["offset"]]), np.zeros(0)
 
-    def where(self, names, values, unit):
-        return f"{names}: {values['offset']:.3g} {unit} at all positions, speeds and times"
+    def where(self, names, values, units):
+        return f"{names}: {values['offset']:.3g} {units['offset']} at all positions, speeds and times"

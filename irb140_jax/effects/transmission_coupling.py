@@ -44,5 +44,5 @@ class TransmissionCoupling(AbstractEffect):
     def lowest(self, robot, joints):
         return np.zeros(2)
 
-    def where(self, names, values, unit):
-        return f"{names}: on both joints alike, in proportion to their relative speed, {values['viscous']:.3g} {unit}"
+    def where(self, names, values, units):
+        return f"{names}: on both joints alike, in proportion to their relative speed, {values['viscous']:.3g} {units['viscous']}"

@@ -35,5 +35,5 @@ class ViscousFriction(AbstractEffect):
     def lowest(self, robot, joints):
         return -np.asarray(robot.damping)[joints]
 
-    def where(self, names, values, unit):
-        return f"{names}: in proportion to speed, {values['viscous']:.3g} {unit}, so mostly in the fast stretches"
+    def where(self, names, values, units):
+        return f"{names}: in proportion to speed, {values['viscous']:.3g} {units['viscous']}, so mostly in the fast stretches"

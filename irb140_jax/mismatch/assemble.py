@@ -37,7 +37,7 @@ class LooseInertials(AbstractEffect):
     def amplitudes(self, values):
         raise NotImplementedError("inertials have no amplitudes of their own")
 
-    def where(self, names, values, unit):
+    def where(self, names, values, units):
         return f"{names}: in the rigid body's own torques"
 
 
@@ -118,7 +118,8 @@ def first_noise(data: Data) -> Noise:
     residuals = [np.zeros_like(s.y) for s in data.stretches]
     dof = np.zeros(n)
     for j in range(n):
-        keep = data.scale > 0
+        keep = np.any([np.any(s.X[:, j] != 0.0, axis=0) for s in data.stretches], axis=0) & (data.scale > 0)
+        keep[-data.nuisances :] = False  # the loose inertials repeat the inertials
         A = np.concatenate([s.X[s.use[:, j], j][:, keep] * data.scale[keep] for s in data.stretches])
         y = np.concatenate([s.y[s.use[:, j], j] for s in data.stretches])
         if len(y) < 10:

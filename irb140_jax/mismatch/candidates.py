@@ -96,13 +96,16 @@ def scales_of(recordings: Sequence[Conditioned]) -> Scales:
     )
 
 
-def columns_along(lib: Library, recording: Conditioned, load: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
+Loads = tuple[np.ndarray, np.ndarray]  # torque the transmissions carry and torque the motors give, each (T, n)
+
+
+def columns_along(lib: Library, recording: Conditioned, loads: Loads | None = None) -> tuple[np.ndarray, ...]:
     """Rigid-body regressor, nominal torque and all candidate columns along a recording.
 
     Args:
         lib: The library.
         recording: T samples.
-        load: Torque the transmission carries [N m or N], shape (T, n); the nominal model's where None.
+        loads: Loads along the recording [N m or N]; the nominal model's where None.
 
     Returns:
         Regressor (T, n, 10 n); nominal torque (T, n); columns (T, n, size), zero in rows a candidate does not touch.
@@ -111,23 +114,27 @@ def columns_along(lib: Library, recording: Conditioned, load: np.ndarray | None 
     parts = []
     for start in range(0, T, CHUNK):
         piece = [x[start : start + CHUNK] for x in (recording.t, recording.q, recording.qd, recording.qdd)]
-        piece.append(piece[1] if load is None else load[start : start + CHUNK])
+        piece += [piece[1]] * 2 if loads is None else [x[start : start + CHUNK] for x in loads]
         pad = CHUNK - len(piece[0])
         piece = [np.pad(x, ((0, pad),) + ((0, 0),) * (x.ndim - 1), mode="edge") for x in piece]
+        t, q, qd, qdd, load, total = piece
+        Y = dynamics.regressor_batch(lib.robot, q, qd, qdd)
         out = _columns(
-            lib.robot, tuple(b[0] for b in lib.blocks), *piece, recording.rest_speed,
-            [b[1] for b in lib.blocks], [b[2] for b in lib.blocks], load is None,
+            lib.robot, tuple(b[0] for b in lib.blocks), Y, t, q, qd, qdd, load, total, recording.rest_speed,
+            [b[1] for b in lib.blocks], [b[2] for b in lib.blocks], jnp.asarray(loads is None),
         )  # fmt: skip
-        parts.append([np.asarray(x)[: CHUNK - pad] for x in out])
+        parts.append([np.asarray(x)[: CHUNK - pad] for x in (Y, *out)])
     return tuple(np.concatenate(x) for x in zip(*parts, strict=True))
 
 
+# The regressor is compiled apart: fused into this program, XLA would unroll it once for every use.
 @eqx.filter_jit
-def _columns(robot, effects, t, q, qd, qdd, load, rest_speed, sites, shapes, nominal_load):
-    Y = dynamics.regressor_batch(robot, q, qd, qdd)
+def _columns(robot, effects, Y, t, q, qd, qdd, load, total, rest_speed, sites, shapes, of_nominal):
     passive = jax.vmap(partial(_passive, robot))(q, qd, rest_speed + 0.0 * qd)
     nominal = Y @ robot.phi.ravel() + robot.armature * qdd + passive
-    motion = Motion(t, q, qd, qdd, nominal if nominal_load else load, rest_speed)
+    # Chosen by value, not by a static flag: both uses share one compiled program.
+    load, total = (jnp.where(of_nominal, nominal, x) for x in (load, total))
+    motion = Motion(t, q, qd, qdd, load, total, rest_speed)
     rows = []
     for effect, joints, shape in zip(effects, sites, shapes, strict=True):
         joints, shape = jnp.asarray(joints), jnp.asarray(shape)
@@ -136,7 +143,7 @@ def _columns(robot, effects, t, q, qd, qdd, load, rest_speed, sites, shapes, nom
         S, G, T, m, k = c.shape
         onto = jax.nn.one_hot(joints, robot.n, dtype=c.dtype)  # (S, m, n)
         rows.append(jnp.einsum("sgtmk,smn->tnsgk", c, onto).reshape(T, robot.n, S * G * k))
-    return Y, nominal, jnp.concatenate(rows, axis=-1)
+    return nominal, jnp.concatenate([jnp.zeros((*q.shape, 0)), *rows], axis=-1)
 
 
 def _passive(robot, q, qd, rest_speed):
@@ -172,9 +179,9 @@ class Stretch:
     qdd: np.ndarray
 
 
-def stretch(lib: Library, recording: Conditioned, index: int, band: Band, load: np.ndarray | None = None) -> Stretch:
+def stretch(lib: Library, recording: Conditioned, index: int, band: Band, loads: Loads | None = None) -> Stretch:
     """All columns of a recording through the common low-pass, at the kept samples."""
-    Y, nominal, columns = columns_along(lib, recording, load)
+    Y, nominal, columns = columns_along(lib, recording, loads)
     kept = band.kept(len(recording.t))
     nominal, tau = band.apply(nominal), band.apply(recording.tau)
     X = np.concatenate([band.apply(Y), band.apply(columns)], axis=-1)

@@ -7,8 +7,9 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.mismatch.assemble import Data, assemble, first_noise, problem
-from irb140_jax.mismatch.candidates import Library, columns_along, library, scales_of, stretch
+from irb140_jax.mismatch.candidates import Candidate, Library, Loads, columns_along, library, scales_of, stretch
 from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
+from irb140_jax.mismatch.model import composed
 from irb140_jax.mismatch.name import Problem, search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
@@ -29,7 +30,8 @@ class Explanation:
         problem: Search problem.
         grams: Gram matrices by block.
         chosen: Indices of the candidates in the explanation.
-        loads: Torque of the explanation along each conditioned recording, (T, n).
+        factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
+        floor: Noise when every column of the library may help.
     """
 
     lib: Library
@@ -38,7 +40,8 @@ class Explanation:
     problem: Problem
     grams: Grams
     chosen: tuple[int, ...]
-    loads: list[np.ndarray]
+    factor: np.ndarray
+    floor: Noise
 
     @property
     def members(self) -> list:
@@ -71,13 +74,14 @@ def explain(
     """
     factor = inertial_prior_factor(robot, 1.0)
     lib = library(robot, effects, scales_of(recordings))
-    loads: list[np.ndarray | None] = [None] * len(recordings)
+    loads: list[Loads | None] = [None] * len(recordings)
     noise, chosen = None, ()
     for turn in range(PASSES):
         progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn + 1})")
         rows = [stretch(lib, r, i, band, load) for i, (r, load) in enumerate(zip(recordings, loads, strict=True))]
         data = assemble(lib, rows, factor, uncertainty)
-        noise = noise or first_noise(data)
+        floor = first_noise(data)
+        noise = noise or floor
         progress(f"searching sets of explanations (round {turn + 1})")
         # The noise that the last round left may hide an effect that it named wrongly: settle it twice.
         for _ in range(2):
@@ -86,10 +90,11 @@ def explain(
             noise = _noise_under(data, prob, g, chosen)
         prob, g = problem(data, noise)
         chosen = search(prob, chosen)
-        loads = [_load(lib, data, g, prob, chosen, factor, r) for r in recordings]
+        post = full_posterior(data, prob, g, chosen)
+        loads = [_loads(lib, data, post, chosen, factor, r) for r in recordings]
         if turn < PASSES - 1:
             lib, chosen = _refined(lib, data, prob, chosen)
-    return Explanation(lib, data, noise, prob, g, chosen, loads)
+    return Explanation(lib, data, noise, prob, g, chosen, factor, floor)
 
 
 def full_posterior(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without=None) -> Posterior:
@@ -108,22 +113,29 @@ def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -
     return noise_from_residuals(residuals, [s.use for s in data.stretches], np.full(n, used / n))
 
 
-def _load(lib: Library, data: Data, g: Grams, prob: Problem, chosen, factor: np.ndarray, r: Conditioned) -> np.ndarray:
-    """Torque the explained model transmits along a recording: rigid body and effects, less friction's own share."""
-    post = full_posterior(data, prob, g, chosen)
+def _loads(lib: Library, data: Data, post: Posterior, chosen, factor: np.ndarray, r: Conditioned) -> Loads:
+    """Loads of the explained model along a recording."""
+    dphi, members, amplitudes = fitted(data, post, chosen, factor)
+    torques = composed(*columns_along(lib, r), members, amplitudes, dphi, dphi)
+    return torques.load, torques.total
+
+
+def fitted(
+    data: Data, post: Posterior, chosen: tuple[int, ...], factor: np.ndarray
+) -> tuple[np.ndarray, list[Candidate], list[np.ndarray]]:
+    """Shift of the inertial parameters (10 n,), and the named effects with their amplitudes, from a posterior."""
     w = post.mean * data.scale[post.columns]
-    Y, nominal, columns = columns_along(lib, r)
-    theta = factor @ w[: data.nuisances]
-    out = nominal + Y @ theta
-    at = data.nuisances
+    dphi, at = factor @ w[: data.nuisances], data.nuisances
+    members, amplitudes = [], []
     for c in (data.candidates[i] for i in chosen):
         part = w[at : at + len(c.columns)]
         at += len(c.columns)
         if c.slug == "inertials":
-            out = out + Y @ (factor[:, 10 * c.joints[0] : 10 * c.joints[0] + 10] @ part)
-        elif c.slug != "torque_gain":
-            out = out + columns[..., c.columns] @ part
-    return out
+            dphi = dphi + factor[:, 10 * c.joints[0] : 10 * c.joints[0] + 10] @ part
+        else:
+            members.append(c)
+            amplitudes.append(part)
+    return dphi, members, amplitudes
 
 
 def _refined(lib: Library, data: Data, prob: Problem, chosen: tuple[int, ...]) -> tuple[Library, tuple[int, ...]]:

@@ -12,7 +12,7 @@ from irb140_jax.mismatch.evidence import eliminated, gains, posterior
 ACCEPT = np.log(100.0)  # posterior odds a finding needs; under the null, a bound of 1 % on a false one (Markov)
 PREFER = np.log(20.0)  # odds at which a law replaces the simpler one that it contains
 FORM_ERROR = 0.03  # no law is exact: 3 % of what a joint's effects explain is not evidence for another effect
-RIGID_ERROR = 0.002  # the same for the rigid-body torque: geometry, timing
+RIGID_ERROR = 0.0003  # the same for the rigid-body torque: geometry, timing
 MOST = 40  # effects at most in one set
 
 

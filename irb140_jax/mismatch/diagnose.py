@@ -1,0 +1,176 @@
+"""The whole path: recordings and a model in; verdict, findings, corrected model and held-out proof out."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.errors import RecordingError
+from irb140_jax.mismatch import locate
+from irb140_jax.mismatch.evidence import posterior
+from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior
+from irb140_jax.mismatch.findings import findings, not_testable, ranking
+from irb140_jax.mismatch.model import CorrectedModel, Named
+from irb140_jax.mismatch.prove import HeldOut, held_out, held_out_gain, refit_problem
+from irb140_jax.mismatch.unknown import Unexplained, unexplained
+from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
+from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.recording import Recording
+from irb140_jax.robot import Robot
+
+FEWEST_ROWS = 100  # low-passed rows below which nothing can be said
+
+
+@dataclasses.dataclass(frozen=True)
+class DiagnoseConfig:
+    """Options of a diagnosis.
+
+    Attributes:
+        inertial_uncertainty: Relative standard deviation of the model's inertial parameters.
+        effects: The library; by default every effect of the catalogue.
+    """
+
+    inertial_uncertainty: float = 0.05
+    effects: tuple[AbstractEffect, ...] = tuple(CATALOGUE.values())
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """A diagnosis.
+
+    Attributes:
+        diagnosis: The contract's `diagnosis.json`.
+        model: The corrected model, for predictions.
+        views: Data for the report's figures.
+    """
+
+    diagnosis: dict[str, Any]
+    model: CorrectedModel
+    views: dict[str, Any]
+
+
+def diagnose(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    config: DiagnoseConfig | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Result:
+    """Locate, name, model and prove what a rigid-body model leaves out.
+
+    Args:
+        robot: The nominal model.
+        recordings: At least one, of this robot.
+        config: Options.
+        progress: Told what is being done, a few words at a time.
+
+    Returns:
+        The result; the same input gives the same result to 6 significant digits.
+
+    Raises:
+        RecordingError: Too little is left of the recordings after conditioning.
+    """
+    config = config or DiagnoseConfig()
+    progress("smoothing and differentiating the positions")
+    band = choose_band(list(recordings))
+    smooth = [condition(r, band) for r in recordings]
+    for r in smooth:
+        if len(band.kept(len(r.t))) < FEWEST_ROWS:
+            raise RecordingError(
+                f"{r.source}: {r.t[-1] - r.t[0]:.3g} s are left after the filter's ends are cut, too few to compare; "
+                "record at least 5 s of motion"
+            )
+    ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, progress)
+    progress("proving on data that the fit did not see")
+    ex = _gated(ex)
+    refit_grams, refit_columns = refit_problem(ex)
+    proof = held_out(ex, refit_grams, refit_columns)
+    progress("looking for structure that no effect explains")
+    rest = unexplained(ex, proof)
+    found = findings(robot, ex)
+    model = _model(robot, ex, refit_grams, refit_columns, band)
+    diagnosis = _document(robot, ex, proof, found, rest, recordings)
+    return Result(diagnosis, model, _views(robot, ex, proof, model, recordings, smooth, diagnosis))
+
+
+def _gated(ex: Explanation) -> Explanation:
+    """Without findings that do not help on unseen data: a name must transfer."""
+    while True:
+        losses = {c: held_out_gain(ex, c)[1] for c in ex.chosen if ex.data.candidates[c].slug != "inertials"}
+        losses = {c: gain for c, gain in losses.items() if gain <= 0}
+        if not losses:
+            return ex
+        worst = min(losses, key=lambda c: losses[c])
+        ex = dataclasses.replace(ex, chosen=tuple(c for c in ex.chosen if c != worst))
+
+
+def _model(robot: Robot, ex: Explanation, refit_grams, refit_columns: np.ndarray, band) -> CorrectedModel:
+    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
+    refit, _, _ = fitted(ex.data, posterior(refit_grams.total(), refit_columns), loose, ex.factor)
+    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    dphi, members, amplitudes = fitted(ex.data, post, ex.chosen, ex.factor)
+    phi = np.asarray(robot.phi)
+    named = tuple(
+        Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)
+    )
+    return CorrectedModel(robot, phi + refit.reshape(phi.shape), phi + dphi.reshape(phi.shape), named, band)
+
+
+def _document(
+    robot: Robot, ex: Explanation, proof: HeldOut, found: list[dict[str, Any]], rest: list[Unexplained],
+    recordings: Sequence[Recording],
+) -> dict[str, Any]:  # fmt: skip
+    fit = {
+        name: {
+            "rmse_nominal": a, "rmse_refit": b, "rmse_corrected": c, "noise_floor": d,
+        }
+        for name, a, b, c, d in zip(
+            robot.joint_names, *(proof.rmse(x).tolist() for x in (proof.nominal, proof.refit, proof.corrected)),
+            proof.floor.tolist(), strict=True,
+        )
+    }  # fmt: skip
+    inertials = inertial_views(robot, ex)
+    kind = verdict(ex, proof, found, rest)
+    return rounded({
+        "schema": 1,
+        "verdict": kind,
+        "findings": found,
+        "unexplained": [unexplained_entry(robot, u) for u in rest],
+        "not_testable": not_testable(robot, ex, {f["effect"] for f in found}),
+        "fit": fit,
+        "summary": summary(kind, found, rest, fit, inertials, robot, [r.source for r in recordings]),
+    })  # fmt: skip
+
+
+def _views(robot, ex, proof, model, recordings, smooth, diagnosis) -> dict[str, Any]:
+    names = [r.source for r in recordings]
+    notes = [f"{r.source}: {note}" for r in smooth for note in r.notes]
+    notes.append(
+        f"Compared below {model.band.torque:.3g} Hz; positions were smoothed below {model.band.position:.3g} Hz and "
+        "differentiated. Figures leave out rows in which the joint rests: dry friction is undetermined there."
+    )
+    return rounded({
+        "joints": list(robot.joint_names),
+        "recordings": names,
+        "maps": locate.maps(robot, ex, proof),
+        "traces": locate.traces(robot, ex, proof, names),
+        "ranking": ranking(robot, ex),
+        "residual_spectrum": locate.spectra(robot, ex, proof),
+        "inertials": inertial_views(robot, ex),
+        "notes": notes,
+    })  # fmt: skip
+
+
+def rounded(x: Any, digits: int = 6) -> Any:
+    """Numbers to `digits` significant digits, so that the same input gives the same file."""
+    if isinstance(x, dict):
+        return {k: rounded(v, digits) for k, v in x.items()}
+    if isinstance(x, list | tuple):
+        return [rounded(v, digits) for v in x]
+    if isinstance(x, float | np.floating):
+        value = float(x)
+        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+    return x.item() if isinstance(x, np.generic) else x

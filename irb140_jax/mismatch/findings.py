@@ -1,0 +1,202 @@
+"""From an explanation to findings: parameters with intervals, evidence, alternatives, and what can't be tested."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.evidence import eliminated, gains
+from irb140_jax.mismatch.explain import Explanation, full_posterior
+from irb140_jax.mismatch.name import group_odds
+from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
+from irb140_jax.robot import Robot
+
+WORTH_SAYING = 0.02  # alternatives less probable than this stay unsaid
+REFERENCE_SHARE = 0.06  # an effect of this share of the joint's torque should be seen ...
+VISIBLE = 5.0  # ... with this many standard deviations, or the motion can't test it
+
+
+def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
+    """The contract's findings, strongest first."""
+    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    widen = jackknife_factor(ex)
+    w = post.mean * ex.data.scale[post.columns]
+    cov = post.cov * np.outer(widen, widen) * np.outer(ex.data.scale[post.columns], ex.data.scale[post.columns])
+    out, at = [], ex.data.nuisances
+    for index in ex.chosen:
+        c = ex.data.candidates[index]
+        rows = slice(at, at + len(c.columns))
+        at += len(c.columns)
+        if c.slug == "inertials":
+            continue
+        values = _parameters(robot, ex, index, w[rows], cov[rows, rows])
+        names = ", ".join(robot.joint_names[j] for j in c.joints)
+        units = {k: v["unit"] for k, v in values.items()}
+        out.append({
+            "effect": c.slug,
+            "joints": [robot.joint_names[j] for j in c.joints],
+            "where": c.effect.where(names, {k: v["value"] for k, v in values.items()}, units),
+            "parameters": values,
+            "evidence": _evidence(ex, index),
+            "alternatives": _alternatives(robot, ex, index),
+        })  # fmt: skip
+        out[-1]["evidence"]["probability"] = _probability(ex, index)
+    return sorted(out, key=lambda f: -f["evidence"]["delta_bic"])
+
+
+def _parameters(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray) -> dict[str, Any]:
+    """Physical parameters and their standard deviations by the delta method over amplitudes and shape."""
+    c = ex.data.candidates[index]
+    full = np.zeros(max(max(v) for v in c.effect.variants) + 1)
+
+    def physical(x: np.ndarray) -> np.ndarray:
+        full[list(c.variant)] = x[: len(w)]
+        return np.asarray(c.effect.physical(jnp.asarray(full), jnp.asarray(x[len(w) :])))
+
+    at = np.concatenate([w, c.shape])
+    value = physical(at)
+    joint_cov = np.zeros((len(at), len(at)))
+    joint_cov[: len(w), : len(w)] = cov
+    joint_cov[len(w) :, len(w) :] = np.diag(_shape_variance(ex, index))
+    slope = np.stack([
+        (physical(at + step) - physical(at - step)) / (2 * step.sum())
+        for step in np.diag(1e-5 * np.maximum(np.abs(at), 1e-6))
+    ], axis=1)  # fmt: skip
+    variance = np.einsum("pk,kl,pl->p", slope, joint_cov, slope)
+    slide = robot.is_slide[c.joints[0]]
+    present = range(len(value)) if len(c.variant) == len(full) else [i for i in c.variant if i < len(value)]
+    return {
+        c.effect.parameters[i].name: {
+            "value": float(value[i]), "std": float(np.sqrt(max(variance[i], 0.0))),
+            "unit": c.effect.unit(c.effect.parameters[i], slide),
+        }
+        for i in present
+    }  # fmt: skip
+
+
+def _shape_variance(ex: Explanation, index: int) -> np.ndarray:
+    """Variance of a continuous shape from the curvature of the evidence over its refined grid."""
+    c = ex.data.candidates[index]
+    if not c.effect.refines():
+        return np.zeros(len(c.shape))
+    alike = [i for i, o in enumerate(ex.data.candidates) if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant]
+    gain = ex.problem.scores(ex.problem.without(ex.chosen, index))[alike]
+    x = np.array([float(ex.data.candidates[i].shape[0]) for i in alike])
+    finite = np.isfinite(gain)
+    if finite.sum() < 3:
+        return np.array([np.ptp(x) ** 2])
+    p = np.exp(gain[finite] - gain[finite].max())
+    # The grid is a stretch of a smooth posterior: spacing weights make the sum an integral.
+    p *= np.gradient(x[finite])
+    p /= p.sum()
+    mean = p @ x[finite]
+    spacing = float(np.min(np.diff(np.sort(x))))
+    return np.array([max(float(p @ (x[finite] - mean) ** 2), spacing**2 / 12.0)])
+
+
+def _evidence(ex: Explanation, index: int) -> dict[str, float]:
+    H = ex.problem.without(ex.chosen, index)
+    columns = ex.data.candidates[index].columns + ex.problem.offset
+    M = H[np.ix_(columns, columns)]
+    drop = float(H[columns, -1] @ np.linalg.lstsq(M, H[columns, -1], rcond=1e-12)[0])
+    share, _ = held_out_gain(ex, index)
+    return {"delta_bic": drop - len(columns) * float(np.log(ex.grams.rows.sum())), "heldout_gain": share}
+
+
+def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], float]:
+    """Log odds of every effect that could stand in a finding's place, and of none (slug "")."""
+    c = ex.data.candidates[index]
+    H = ex.problem.without(ex.chosen, index)
+    odds = {
+        key: value
+        for key, value in group_odds(ex.problem, H).items()
+        if set(key[1]) & set(c.joints) and key[0] != "inertials"
+    }
+    odds["", ()] = 0.0
+    guard = ex.problem.guard(ex.chosen)[list(c.joints)].max()
+    own = odds[c.slug, c.joints]
+    # Differences within what an imperfect law could feign do not count against a rival.
+    return {k: v if k == (c.slug, c.joints) or not k[0] else v + min(guard, max(own - v, 0.0)) * _alike(c, k) for k, v in odds.items()}
+
+
+def _alike(c: Candidate, key: tuple[str, tuple[int, ...]]) -> float:
+    """1 for laws that the named one does not contain: a contained law has already lost by more than the guard."""
+    return 0.0 if key[0] in c.effect.contains or c.slug in CATALOGUE[key[0]].contains else 1.0
+
+
+def _shares(odds: dict) -> dict:
+    top = max(odds.values())
+    weight = {k: float(np.exp(v - top)) for k, v in odds.items()}
+    return {k: v / sum(weight.values()) for k, v in weight.items()}
+
+
+def _probability(ex: Explanation, index: int) -> float:
+    c = ex.data.candidates[index]
+    return _shares(_rivals(ex, index))[c.slug, c.joints]
+
+
+def _alternatives(robot: Robot, ex: Explanation, index: int) -> list[dict[str, Any]]:
+    c = ex.data.candidates[index]
+    best: dict[str, float] = {}
+    for (slug, joints), p in _shares(_rivals(ex, index)).items():
+        if slug and (slug, joints) != (c.slug, c.joints) and slug != c.slug and p > WORTH_SAYING:
+            best[slug] = max(best.get(slug, 0.0), p)
+    return [
+        {"effect": slug, "probability": p, "separate_by": _separation(c.effect, CATALOGUE[slug])}
+        for slug, p in sorted(best.items(), key=lambda item: -item[1])
+    ]
+
+
+def _separation(one: AbstractEffect, other: AbstractEffect) -> str:
+    motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
+    return f"Record {motion}." if motion else f"Record {one.needs}; and, for {other.title}, {other.needs}."
+
+
+def not_testable(robot: Robot, ex: Explanation, found: set[str]) -> list[dict[str, Any]]:
+    """Effects that this motion could not have shown, with the joints where that is so."""
+    H, _ = eliminated(ex.problem.H, ex.problem.columns(ex.chosen))
+    blind: dict[str, list[tuple[int, ...]]] = {}
+    seen: dict[tuple[str, tuple[int, ...]], float] = {}
+    members = ex.members
+    for c in ex.data.candidates:
+        if c.slug == "inertials" or c.slug in found:
+            continue
+        if any(m.joints == c.joints and (c.slug in m.effect.contains or m.slug in c.effect.contains) for m in members):
+            continue  # part of a finding, or tested against it
+        columns = c.columns + ex.problem.offset
+        own, _ = eliminated(H, columns[:-1])
+        z = np.sqrt(max(own[columns[-1], columns[-1]], 0.0)) * REFERENCE_SHARE / 0.3
+        key = (c.slug, c.joints)
+        seen[key] = max(seen.get(key, 0.0), z)
+    for (slug, joints), z in seen.items():
+        if z < VISIBLE:
+            blind.setdefault(slug, []).append(joints)
+    return [
+        {
+            "effect": slug,
+            "joints": [robot.joint_names[j] for j in sorted({j for joints in sites for j in joints})],
+            "needs": f"Needs {CATALOGUE[slug].needs}.",
+        }
+        for slug, sites in sorted(blind.items())
+    ]
+
+
+def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any]]:
+    """Candidates by evidence, each alone and given the explanation, for the report."""
+    rows = []
+    chosen = {(ex.data.candidates[c].slug, ex.data.candidates[c].joints) for c in ex.chosen}
+    # Alone: over nothing but the inertials, with the noise of the final model.
+    chi, _ = gains(ex.problem.H, list(ex.data.candidates), ex.problem.offset)
+    best: dict[tuple[str, tuple[int, ...]], float] = {}
+    for c, gain in zip(ex.data.candidates, chi, strict=True):
+        best[c.slug, c.joints] = max(best.get((c.slug, c.joints), -np.inf), float(gain))
+    for (slug, joints), gain in sorted(best.items(), key=lambda item: -item[1])[:most]:
+        rows.append({
+            "effect": slug, "joints": [robot.joint_names[j] for j in joints], "delta_bic": 2.0 * gain,
+            "probability": 1.0 if (slug, joints) in chosen else 0.0, "chosen": (slug, joints) in chosen,
+            "stage": "alone",
+        })  # fmt: skip
+    return rows

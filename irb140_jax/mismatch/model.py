@@ -1,0 +1,195 @@
+"""The corrected model: nominal robot, refitted inertials, and the named effects with their parameters."""
+
+import dataclasses
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.errors import InputError
+from irb140_jax.mismatch.candidates import Candidate, Library, columns_along
+from irb140_jax.recordings.condition import Band, Conditioned, condition
+from irb140_jax.recordings.recording import Recording
+from irb140_jax.robot import Robot
+
+
+@dataclasses.dataclass(frozen=True)
+class Named:
+    """A named effect with its numbers.
+
+    Attributes:
+        effect: The effect.
+        joints: Indices of its joints.
+        variant: Columns it uses.
+        amplitudes: One per column used.
+        shape: Shape parameters.
+    """
+
+    effect: AbstractEffect
+    joints: tuple[int, ...]
+    variant: tuple[int, ...]
+    amplitudes: np.ndarray
+    shape: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Torques:
+    """Torques along a motion, each (T, n) [N m or N].
+
+    Attributes:
+        nominal: Of the model as given.
+        refit: Of the rigid body with refitted inertials.
+        load: What the transmissions carry: corrected rigid body and all effects but friction and gain.
+        total: Load and friction: what the motors really give.
+        corrected: What the controller logs: total and the wrong torque constants.
+    """
+
+    nominal: np.ndarray
+    refit: np.ndarray
+    load: np.ndarray
+    total: np.ndarray
+    corrected: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class CorrectedModel:
+    """What a diagnosis leaves behind for predictions.
+
+    Attributes:
+        robot: The nominal model.
+        phi_refit: Inertial parameters refitted without effects, shape (n, 10).
+        phi_corrected: Inertial parameters refitted with the effects, shape (n, 10).
+        named: The effects.
+        band: Of the comparison.
+    """
+
+    robot: Robot
+    phi_refit: np.ndarray
+    phi_corrected: np.ndarray
+    named: tuple[Named, ...]
+    band: Band
+
+
+def composed(
+    Y: np.ndarray, nominal: np.ndarray, columns: np.ndarray, candidates: list[Candidate], amplitudes: list[np.ndarray],
+    dphi_refit: np.ndarray, dphi_corrected: np.ndarray,
+) -> Torques:  # fmt: skip
+    """Add up a model's torques from regressor (T, n, 10 n), nominal torque (T, n) and columns (T, n, K)."""
+    load = nominal + Y @ dphi_corrected
+    friction, gain = np.zeros_like(load), np.zeros_like(load)
+    for c, w in zip(candidates, amplitudes, strict=True):
+        part = columns[..., c.columns] @ w
+        if c.slug == "torque_gain":
+            gain += part
+        elif c.effect.dissipative:
+            friction += part
+        else:
+            load = load + part
+    total = load + friction
+    return Torques(nominal, nominal + Y @ dphi_refit, load, total, total + gain)
+
+
+def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
+    """The model's torques along a conditioned recording, on its grid."""
+    blocks, candidates, first = [], [], 0
+    for named in model.named:
+        width = max(max(v) for v in named.effect.variants) + 1
+        blocks.append((named.effect, np.array([named.joints]), named.shape[None, None, :], first))
+        candidates.append(
+            Candidate(named.effect, named.joints, named.shape, first + np.array(named.variant), named.variant,
+                      np.full(len(named.variant), -np.inf))
+        )  # fmt: skip
+        first += width
+    lib = Library(model.robot, tuple(candidates), tuple(blocks), first)
+    nominal_phi = np.asarray(model.robot.phi)
+    shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
+    amplitudes = [named.amplitudes for named in model.named]
+    torques = composed(*columns_along(lib, recording), candidates, amplitudes, *shifts)
+    if not model.named:
+        return torques
+    # Columns that depend on the load see the corrected one, as they did in the fit.
+    return composed(*columns_along(lib, recording, (torques.load, torques.total)), candidates, amplitudes, *shifts)
+
+
+def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray]:
+    """Torques of the diagnosed models along a new recording, one row a row of it.
+
+    Returns:
+        "nominal", "refit" and "corrected", each (T, n) [N m or N].
+
+    Raises:
+        InputError: The recording has other joints than the model.
+    """
+    if tuple(recording.joint_names) != model.robot.joint_names:
+        raise InputError(
+            f"{recording.source}: holds joints {', '.join(recording.joint_names)}; the diagnosis is of a robot with "
+            f"joints {', '.join(model.robot.joint_names)}"
+        )
+    smooth = condition(recording, model.band, pad=True)
+    torques = torques_along(model, smooth)
+    out = {}
+    for name in ("nominal", "refit", "corrected"):
+        values = getattr(torques, name)
+        out[name] = np.stack([np.interp(recording.t, smooth.t, values[:, j]) for j in range(values.shape[1])], axis=1)
+    return out
+
+
+def to_json(model: CorrectedModel) -> dict[str, Any]:
+    """Everything of a model as JSON."""
+    arrays, static = eqx.partition(model.robot, eqx.is_array)
+    leaves = {f.name: np.asarray(getattr(arrays, f.name)).tolist() for f in dataclasses.fields(Robot)
+              if eqx.is_array(getattr(arrays, f.name))}  # fmt: skip
+    return {
+        "schema": 1,
+        "robot": {
+            "leaves": _finite(leaves), "joint_names": static.joint_names, "is_slide": static.is_slide,
+            "name": static.name,
+        },
+        "phi_refit": model.phi_refit.tolist(),
+        "phi_corrected": model.phi_corrected.tolist(),
+        "band": dataclasses.asdict(model.band),
+        "effects": [
+            {
+                "effect": n.effect.slug, "joints": list(n.joints), "variant": list(n.variant),
+                "amplitudes": n.amplitudes.tolist(), "shape": n.shape.tolist(),
+            }
+            for n in model.named
+        ],
+    }  # fmt: skip
+
+
+def from_json(data: dict[str, Any]) -> CorrectedModel:
+    """The inverse of `to_json`."""
+    robot = data["robot"]
+    leaves = {k: jnp.asarray(np.array(_infinite(v), dtype=float)) for k, v in robot["leaves"].items()}
+    return CorrectedModel(
+        Robot(
+            **leaves, joint_names=tuple(robot["joint_names"]), is_slide=tuple(robot["is_slide"]), name=robot["name"]
+        ),
+        np.array(data["phi_refit"]),
+        np.array(data["phi_corrected"]),
+        tuple(
+            Named(
+                CATALOGUE[e["effect"]], tuple(e["joints"]), tuple(e["variant"]), np.array(e["amplitudes"], dtype=float),
+                np.array(e["shape"], dtype=float),
+            )
+            for e in data["effects"]
+        ),
+        Band(**data["band"]),
+    )  # fmt: skip
+
+
+def _finite(x: Any) -> Any:
+    """JSON has no infinity: limits that a model lacks are written as the words "inf" and "-inf"."""
+    if isinstance(x, dict):
+        return {k: _finite(v) for k, v in x.items()}
+    if isinstance(x, list):
+        return [_finite(v) for v in x]
+    return x if np.isfinite(x) else str(x)
+
+
+def _infinite(x: Any) -> Any:
+    return [_infinite(v) for v in x] if isinstance(x, list) else float(x)

@@ -1,0 +1,130 @@
+"""Verdict and sentences: what a person reads first."""
+
+from typing import Any
+
+import numpy as np
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.explain import Explanation, fitted, full_posterior
+from irb140_jax.mismatch.prove import HeldOut
+from irb140_jax.mismatch.unknown import Unexplained
+from irb140_jax.robot import Robot
+
+NO_BETTER = np.log(100.0)  # log odds that refitted inertials need over the nominal ones
+NOTABLE_SHIFT = 3.0  # standard deviations by which a link's inertials must move to be worth a sentence
+
+
+def verdict(ex: Explanation, proof: HeldOut, found: list[dict[str, Any]], rest: list[Unexplained]) -> str:
+    """The contract's verdict.
+
+    `unexplained` where nothing is named, or where more is left unnamed than was named.
+    """
+    nominal, corrected = (proof.rmse(x) for x in (proof.nominal, proof.corrected))
+    named = np.sqrt(np.clip(nominal**2 - corrected**2, 0.0, None))
+    if any(not found or u.rms > named[u.joint] for u in rest):
+        return "unexplained"
+    if found:
+        return "physics_left_out"
+    return "parameters_only" if _inertials_matter(ex) else "no_mismatch"
+
+
+def _inertials_matter(ex: Explanation) -> bool:
+    """Whether refitted inertials are clearly more probable than the nominal ones."""
+    H, k = ex.grams.total(), ex.data.nuisances
+    if any(ex.data.candidates[c].slug == "inertials" for c in ex.chosen):
+        return True
+    M = H[:k, :k] + np.eye(k)
+    gain = 0.5 * H[:k, -1] @ np.linalg.solve(M, H[:k, -1]) - 0.5 * np.linalg.slogdet(M)[1]
+    return bool(gain > NO_BETTER)
+
+
+def inertial_views(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
+    """How far each link's inertials moved, in standard deviations of their stated uncertainty, with a sentence."""
+    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    dphi, _, _ = fitted(ex.data, post, ex.chosen, ex.factor)
+    phi = np.asarray(robot.phi) + dphi.reshape(-1, 10)
+    loose = {ex.data.candidates[c].joints[0] for c in ex.chosen if ex.data.candidates[c].slug == "inertials"}
+    uncertainty = ex.data.scale[0] if ex.data.nuisances else 0.05
+    out = []
+    for k, name in enumerate(robot.joint_names):
+        factor = ex.factor[10 * k : 10 * k + 10, 10 * k : 10 * k + 10]
+        theta = np.linalg.lstsq(factor, dphi[10 * k : 10 * k + 10], rcond=1e-9)[0] / max(uncertainty, 1e-12)
+        shift = float(np.max(np.abs(theta)))
+        before, after = float(robot.mass[k]), float(phi[k, 0])
+        sentence = ""
+        if k in loose:
+            sentence = (
+                f"The inertials of the link behind {name} are wrong beyond their stated {100 * uncertainty:.3g} %: "
+                f"{_what_moved(np.asarray(robot.phi)[k], phi[k])}."
+            )
+        elif shift > NOTABLE_SHIFT:
+            sentence = f"The link behind {name} moved by {shift:.1f} standard deviations of the stated uncertainty."
+        out.append({
+            "link": name, "shift_sigma": shift, "mass_nominal": before, "mass_refit": after, "sentence": sentence,
+        })  # fmt: skip
+    return out
+
+
+def _what_moved(before: np.ndarray, after: np.ndarray) -> str:
+    """The inertial parameters that changed most, in words."""
+    names = ("mass", "m cx", "m cy", "m cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+    units = ("kg", *("kg m",) * 3, *("kg m^2",) * 6)
+    groups = (slice(0, 1), slice(1, 4), slice(4, 10))
+    size = np.concatenate([np.full(g.stop - g.start, np.max(np.abs(before[g])) + 1e-12) for g in groups])
+    relative = np.abs(after - before) / size
+    worst = [i for i in np.argsort(-relative)[:3] if relative[i] > 0.02]
+    return ", ".join(f"{names[i]} {before[i]:.3g} -> {after[i]:.3g} {units[i]}" for i in worst) or "see the table"
+
+
+def unexplained_entry(robot: Robot, u: Unexplained) -> dict[str, Any]:
+    """The contract's entry for structure without a name."""
+    name = robot.joint_names[u.joint]
+    unit = "N" if robot.is_slide[u.joint] else "N m"
+    return {
+        "joints": [name],
+        "where": f"{name}: {u.rms:.3g} {unit} RMS that follow the joint's {u.variable} and that no effect explains",
+        "share": u.share,
+        "p_value": u.p_value,
+    }
+
+
+def summary(
+    kind: str, found: list[dict[str, Any]], rest: list[Unexplained], fit: dict[str, Any],
+    inertials: list[dict[str, Any]], robot: Robot, sources: list[str],
+) -> str:  # fmt: skip
+    """A short paragraph for a person."""
+    what = f"{len(sources)} recording{'s' if len(sources) != 1 else ''} of {robot.n} joint{'s' if robot.n != 1 else ''}"
+    parts = {
+        "no_mismatch": f"The model explains {what} to the noise; nothing is left out that this motion could show.",
+        "parameters_only": (
+            f"Nothing is left out that {what} could show: refitted inertial parameters explain the torque to the noise."
+        ),
+        "physics_left_out": f"The model leaves physics out of {what}.",
+        "unexplained": f"The model leaves out structure in {what} that no effect of the library explains.",
+    }
+    said = [parts[kind]]
+    by_effect: dict[str, list[str]] = {}
+    for f in found:
+        by_effect.setdefault(f["effect"], []).append(" and ".join(f["joints"]) if len(f["joints"]) > 1 else f["joints"][0])
+    for effect, joints in by_effect.items():
+        said.append(f"{CATALOGUE[effect].title.capitalize()} on {_listed(joints)}.")
+    undecided = [f for f in found if f["alternatives"]]
+    for f in undecided:
+        rivals = _listed([CATALOGUE[a["effect"]].title for a in f["alternatives"]], "or")
+        said.append(f"On {_listed(f['joints'])} the data can't rule out {rivals} instead.")
+    said += [i["sentence"] for i in inertials if i["sentence"] and "beyond" in i["sentence"]]
+    if rest and kind != "unexplained":
+        said.append(f"Something without a name is left on {_listed([robot.joint_names[u.joint] for u in rest])}.")
+    worst = max(fit, key=lambda j: fit[j]["rmse_nominal"] / max(fit[j]["noise_floor"], 1e-12))
+    f = fit[worst]
+    unit = "N" if robot.is_slide[robot.joint_names.index(worst)] else "N m"
+    said.append(
+        f"On unseen data the error of {worst} goes from {f['rmse_nominal']:.3g} {unit} (model as given) over "
+        f"{f['rmse_refit']:.3g} (inertials refitted) to {f['rmse_corrected']:.3g}; the noise is {f['noise_floor']:.3g}."
+    )
+    return " ".join(said)
+
+
+def _listed(words: list[str], last: str = "and") -> str:
+    words = list(dict.fromkeys(words))
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
