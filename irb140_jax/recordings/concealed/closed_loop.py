@@ -9,6 +9,7 @@ import numpy as np
 from irb140_jax.recordings.concealed.hidden import Hidden, Log, Plant
 from irb140_jax.recordings.excite import Excitation
 
+SETTLING = 0.4  # [s] of standing still at the start before the log begins, so that it doesn't begin with a jolt
 BANDWIDTH = 60.0  # [rad/s] of the position loop, some 10 Hz: usual for an arm of this size
 
 
@@ -32,7 +33,8 @@ def closed_loop(
     Returns:
         The log, T samples.
     """
-    n, steps = nominal.nv, motion.t.size
+    n, before = nominal.nv, round(SETTLING / true.opt.timestep)
+    steps = before + motion.t.size
     true = copy.copy(true)  # effects change friction levels as they go; the next recording starts afresh
     plant = Plant(true, [nominal.joint(i).name for i in range(n)], recording)
     control, data, dofs = mujoco.MjData(nominal), plant.data, plant.dofs
@@ -42,11 +44,12 @@ def closed_loop(
     data.qpos[plant.qpos] -= plant.zero
     mujoco.mj_forward(true, data)
     kp, kd = BANDWIDTH**2, 2.0 * BANDWIDTH
-    wanted = motion.qdd + kp * motion.q + kd * motion.qd
+    held = lambda x: np.concatenate([np.repeat(x[:1], before, axis=0), x])  # noqa: E731
+    wanted, time = held(motion.qdd + kp * motion.q + kd * motion.qd), held(motion.t)
     q, qd, tau = np.empty((steps, n)), np.empty((steps + 1, n)), np.empty((steps, n))
     acting = [effect for effect in hidden if type(effect).act is not Hidden.act]
     for k in range(steps):
-        plant.t = motion.t[k]
+        plant.t = time[k]
         plant.q, plant.qd = data.qpos[plant.qpos], data.qvel[dofs]
         q[k], qd[k] = plant.q + plant.zero, plant.qd
         control.qpos[:], control.qvel[:] = q[k], qd[k]
@@ -64,7 +67,7 @@ def closed_loop(
         # What accelerates and carries the links is what the gear transmitted: applied torque less friction.
         plant.load = (data.qfrc_applied + data.qfrc_passive + data.qfrc_constraint)[dofs]
     qd[steps] = data.qvel[dofs]
-    log = Log(motion.t, q, qd[:-1], np.diff(qd, axis=0) / plant.dt, tau)
+    log = Log(motion.t, q[before:], qd[before:-1], np.diff(qd[before:], axis=0) / plant.dt, tau[before:])
     for effect in hidden:
         log = effect.measured(log)
     return log

@@ -148,10 +148,12 @@ class Contact(_AtTool):
     def shapes(cls, joints, survey, rng):
         normal = rng.normal(size=3)
         normal /= np.linalg.norm(normal)
-        # The wall stands across the way of the tool, so that the tool is behind it during a tenth of the samples.
+        # The wall stands across the way of the tool, so that the tool is behind it during a tenth of the samples, or
+        # a twentieth of its way where it rests at the far end.
         along = tool_path(survey) @ normal
+        position = max(float(np.quantile(along, 0.1)), float(along.min() + 0.05 * np.ptp(along)))
         return {"stiffness": 1.0, **dict(zip(("normal_x", "normal_y", "normal_z"), normal.tolist(), strict=True)),
-                "position": float(np.quantile(along, 0.1))}
+                "position": position}
 
     def force(self, t, recording, point):
         p = self.parameters
