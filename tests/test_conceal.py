@@ -60,7 +60,8 @@ LAWS = {
     "rotor_inertia": lambda p, t, q, v, a, load: p["inertia"] * a,
     "torque_offset": lambda p, t, q, v, a, load: np.full_like(q, p["offset"]),
     "torque_gain": lambda p, t, q, v, a, load: (1.0 / p["gain"] - 1.0) * load,
-    "nonlinear_viscous_friction": lambda p, t, q, v, a, load: p["coefficient"] * np.abs(v) ** p["exponent"] * np.sign(v),
+    "nonlinear_viscous_friction": lambda p, t, q, v, a, load: np.sign(v) * (
+        p["coefficient"] * np.abs(v) ** p["exponent"]),
     "thermal_friction_drift": lambda p, t, q, v, a, load: v * p["viscous_cold"] * (
         1.0 - p["relative_drop"] * (1.0 - np.exp(-t / p["time_constant"]))),
     "position_dependent_friction": lambda p, t, q, v, a, load: np.sign(v) * p["coulomb"] * (
@@ -132,7 +133,8 @@ def test_lag_is_first_order_from_logged_to_real_torque():
 
 
 def test_presliding_is_a_spring_before_slip_and_coulomb_friction_after():
-    case = case_with(Concealment("presliding_hysteresis", ("joint2",), parameters={"coulomb": 6.0, "stiffness": 3000.0}))
+    bristles = {"coulomb": 6.0, "stiffness": 3000.0}
+    case = case_with(Concealment("presliding_hysteresis", ("joint2",), parameters=bristles))
     log, force = case.secret.logs[0], beyond_rigid(case, 0)[:, 1]
     assert np.abs(force).max() <= 6.0 + 1e-6
     assert np.quantile(np.abs(force), 0.9) > 5.9
@@ -225,7 +227,6 @@ def test_another_seed_gives_other_inertials_and_noise():
     motions = short_motions()
     one, other = (conceal(irb140_path(), (), motions, seed=seed) for seed in (1, 2))
     assert one.truth["link_masses"] != other.truth["link_masses"]
-    assert np.abs(one.recordings[0].q - other.recordings[0].q).min() >= 0.0
     assert not np.array_equal(one.recordings[0].q, other.recordings[0].q)
 
 
@@ -348,10 +349,22 @@ def test_random_robots_are_chains_that_can_be_recorded(n):
     robots = [robot_from_model(arm_spec(random_robot(seed, n)).compile()) for seed in range(5)]
     assert all(robot.n == n for robot in robots)
     xml = random_robot(n, n)
-    motions = three_motions(robots[0] if n == 0 else robot_from_model(arm_spec(xml).compile()), 2.0, 1000.0, seed=n)
+    motions = three_motions(robot_from_model(arm_spec(xml).compile()), 2.0, 1000.0, seed=n)
     case = conceal(xml, [Concealment("coulomb_friction", ("joint1",))], motions, seed=n)
     assert np.isfinite(case.recordings[0].tau).all()
     assert case.truth["left_out"]["joint1"] > 0.05
+
+
+def test_friction_and_springs_of_the_model_itself_are_not_taken_for_hidden():
+    own = '<joint name="joint1" type="hinge" damping="0.5" frictionloss="0.8" stiffness="2" springref="0.3" '
+    xml = random_robot(3, 1, slides=0.0).replace('<joint name="joint1" type="hinge" ', own)
+    motions = three_motions(robot_from_model(arm_spec(xml).compile()), 3.0, 1000.0, seed=3)
+    case = conceal(xml, [], motions, seed=3)
+    assert case.secret.rigid.dof_frictionloss[0] == 0.8
+    moving = np.abs(case.secret.logs[0].qd[:, 0]) > STUCK
+    # Damping is taken at the step's end: a few per mil of it.
+    own_friction = 0.8 * np.sign(case.secret.logs[0].qd[moving])
+    np.testing.assert_allclose(beyond_rigid(case, 0)[moving], own_friction, atol=5e-3)
 
 
 def test_random_robots_have_slides_now_and_then():

@@ -118,8 +118,8 @@ def conceal(
     step = max(1, round(1.0 / (rate * dt)))
     rngs = [np.random.default_rng([seed, 30, k]) for k in range(len(logs))]
     recordings = tuple(
-        _recording(log, motion.name, robot.joint_names, survey, noise, step, with_speeds, rng)
-        for log, motion, rng in zip(logs, motions, rngs, strict=True)
+        _recording(log, name, robot.joint_names, survey, noise, step, with_speeds, rng)
+        for log, name, rng in zip(logs, _names(motions), rngs, strict=True)
     )
     left_out = left_out_share(rigid, logs, every=max(1, round(0.02 / dt)))
     truth = {
@@ -158,10 +158,11 @@ def clean_case(seed: int, *, duration: float = 20.0, rate: float = 1000.0) -> Co
 
 
 def left_out_share(rigid: mujoco.MjModel, logs: Sequence[Log], every: int = 1) -> np.ndarray:
-    """What hides in the logs besides the true rigid arm: RMS, as a share of the rigid arm's torque RMS, shape (n,)."""
+    """RMS of what the logs hold beyond the true arm of rigid bodies, as a share of that arm's torque RMS, shape (n,)."""
     rigid_squares, squares = np.zeros(rigid.nv), np.zeros(rigid.nv)
     for log in logs:
         tau = rigid_torque(rigid, log.q[::every], log.qd[::every], log.qdd[::every])
+        tau += rigid.dof_frictionloss * np.sign(log.qd[::every])
         rigid_squares += np.sum(tau**2, axis=0)
         squares += np.sum((log.tau[::every] - tau) ** 2, axis=0)
     return np.sqrt(squares / np.maximum(rigid_squares, 1e-300))
@@ -203,6 +204,12 @@ def _true_model(
     for effect in hidden:
         effect.install(model, dofs)
     return model
+
+
+def _names(motions: Sequence[Excitation]) -> list[str]:
+    """A name for each recording: its kind of motion, numbered where a kind is played more than once."""
+    kinds = [motion.name for motion in motions]
+    return [kind if kinds.count(kind) == 1 else f"{kind}_{kinds[:k].count(kind) + 1}" for k, kind in enumerate(kinds)]
 
 
 def _recording(
