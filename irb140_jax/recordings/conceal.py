@@ -158,7 +158,7 @@ def clean_case(seed: int, *, duration: float = 20.0, rate: float = 1000.0) -> Co
 
 
 def left_out_share(rigid: mujoco.MjModel, logs: Sequence[Log], every: int = 1) -> np.ndarray:
-    """RMS of what the logs hold beyond the true arm of rigid bodies, as a share of that arm's torque RMS, shape (n,)."""
+    """RMS of what the logs hold beyond the true rigid arm, as a share of that arm's torque RMS, shape (n,)."""
     rigid_squares, squares = np.zeros(rigid.nv), np.zeros(rigid.nv)
     for log in logs:
         tau = rigid_torque(rigid, log.q[::every], log.qd[::every], log.qdd[::every])
