@@ -49,11 +49,11 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Non
     moving = seen.travel > np.where(hinge, MOVING[0], MOVING[1])
     model = nominal_torques(robot, seen.q, seen.qd, seen.qdd)
     _check_angles(recording, seen, robot, model, moving & hinge)
-    share = {sign: explained_shares(seen, model, sign, springs=True) for sign in (1, -1)}
     # A joint that is carried along unpowered logs a little of anything, even drag of the wrong sign.
     driven = moving & (np.std(seen.tau, axis=0) > MIN_SHARE * np.std(model.total, axis=0))
+    _check_order(recording, seen, model, moving)
+    share = {sign: explained_shares(seen, model, sign, springs=True) for sign in (1, -1)}
     _check_sign(recording, share, driven)
-    _check_order(recording, explained_shares(seen, model, 1, springs=False), driven)
     _check_scale(recording, seen, model, moving)
 
 
@@ -105,13 +105,6 @@ def _check_angles(recording: Recording, seen: Glance, robot: Robot, model: Torqu
     given = np.median(_misfit(seen.tau, model.total)[hinges])
     if given < 0.7:
         return  # in radians the model already tells most of the torque
-    to_radians = np.where(np.asarray(robot.is_slide), 1.0, np.pi / 180)
-    # As degrees, the same numbers are a motion 57 times slower: one of the two agrees with the torque.
-    other = nominal_torques(robot, *(x * to_radians for x in (seen.q, seen.qd, seen.qdd)))
-    degrees = np.median(_misfit(seen.tau, other.total)[hinges])
-    if given > 5.0 and degrees < 1.2 and far > 2.0 or given > 1.0 and degrees < 0.4 and far > 2 * np.pi:
-        raise RecordingError(f"{source}: the columns q.* look like degrees: in radians the model's torque is off by "
-                             f"{given:.1f} times what is logged, in degrees by {degrees:.1f} times; {remedy}")
     for j in np.flatnonzero(hinges & np.isfinite(robot.lower) & np.isfinite(robot.upper)):
         lower, upper = float(robot.lower[j]), float(robot.upper[j])
         largest = float(np.max(np.abs(recording.q[:, j])))
@@ -120,6 +113,13 @@ def _check_angles(recording: Recording, seen: Glance, robot: Robot, model: Torqu
             raise RecordingError(f"{source}: column q.{names[j]} reaches {largest:.1f} rad, the model's limits are "
                                  f"{lower:.3g} and {upper:.3g} rad: this looks like degrees or the motor side; "
                                  f"{remedy}; if the joint does turn that far, correct the limits in the model")
+    to_radians = np.where(np.asarray(robot.is_slide), 1.0, np.pi / 180)
+    # As degrees, the same numbers are a motion 57 times slower: one of the two agrees with the torque.
+    other = nominal_torques(robot, *(x * to_radians for x in (seen.q, seen.qd, seen.qdd)))
+    degrees = np.median(_misfit(seen.tau, other.total)[hinges])
+    if given > 5.0 and degrees < 1.2 and far > 2.0 or given > 1.0 and degrees < 0.4 and far > 2 * np.pi:
+        raise RecordingError(f"{source}: the columns q.* look like degrees: in radians the model's torque is off by "
+                             f"{given:.1f} times what is logged, in degrees by {degrees:.1f} times; {remedy}")
 
 
 def _check_sign(recording: Recording, share: dict[int, np.ndarray], driven: np.ndarray) -> None:
@@ -134,19 +134,23 @@ def _check_sign(recording: Recording, share: dict[int, np.ndarray], driven: np.n
                              "mend that")
 
 
-def _check_order(recording: Recording, shares: np.ndarray, driven: np.ndarray) -> None:
-    _, best = linear_sum_assignment(-shares)
-    own = np.diag(shares)
-    changed = [j for j, k in enumerate(best) if k != j]
-    # Every joint of the exchange must be explained by its partner and by nothing of its own.
-    sure = [j for j in changed if driven[j] and shares[j, best[j]] > CERTAIN and own[j] < CERTAIN / 2
-            and own[best[j]] < CERTAIN / 2]
-    pairs = [j for j in sure if best[j] in sure]
-    if pairs:
-        names = recording.joint_names
-        text = ", ".join(f"tau.{names[best[j]]} fits joint {names[j]}" for j in pairs)
-        raise RecordingError(f"{recording.source}: torque columns look exchanged: {text}; put the columns in order, or "
-                             "exchange them with --columns FILE.toml")
+def _check_order(recording: Recording, seen: Glance, model: Torques, moving: np.ndarray) -> None:
+    shares = explained_shares(seen, model, 1, springs=False)
+    # Misfit of the model's torque of joint j, as it is, to tau_k.
+    misfit = np.stack([_misfit(seen.tau, model.total[:, [j]]) for j in range(len(shares))])
+    size = np.std(seen.tau, axis=0)[None, :] / np.maximum(np.std(model.total, axis=0)[:, None], 1e-9)
+    by_share = shares > CERTAIN, np.diag(shares) < CERTAIN / 2, linear_sum_assignment(-shares)[1]
+    by_misfit = misfit < 0.5, np.diag(misfit) > 0.6, linear_sum_assignment(misfit)[1]
+    for fits, unfit, best in (by_share, by_misfit):
+        # Every joint of an exchange must be fitted by its partner's column and not by its own.
+        sure = {j for j, k in enumerate(best) if j != k and moving[j] and fits[j, k] and unfit[j] and unfit[k]
+                and size[j, k] > MIN_SHARE}
+        pairs = [j for j in sorted(sure) if best[j] in sure]
+        if pairs:
+            names = recording.joint_names
+            text = ", ".join(f"tau.{names[best[j]]} fits joint {names[j]}" for j in pairs)
+            raise RecordingError(f"{recording.source}: torque columns look exchanged: {text}; put the columns in "
+                                 "order, or exchange them with --columns FILE.toml")
 
 
 def _check_scale(recording: Recording, seen: Glance, model: Torques, moving: np.ndarray) -> None:

@@ -32,7 +32,7 @@ def read_recording(path: str | pathlib.Path, robot: Robot, columns: str | pathli
             wrong and what would mend it.
     """
     recording = unchecked_recording(pathlib.Path(path), robot.joint_names, columns)
-    recording = repair.unwrapped(repair.without_glitches(recording), robot.is_slide)
+    recording = repair.without_glitches(repair.unwrapped(recording, robot.is_slide))
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
     check_against_model(recording, seen, robot)

@@ -2,6 +2,7 @@
 
 import pathlib
 import re
+import warnings
 import zipfile
 
 import numpy as np
@@ -12,7 +13,7 @@ from irb140_jax.errors import RecordingError
 
 READABLE = {".csv": "CSV", ".txt": "CSV", ".tsv": "CSV", ".parquet": "Parquet", ".npz": "NPZ"}
 # What pandas, pyarrow and numpy raise on files that are not what their suffix says.
-BROKEN = (ValueError, KeyError, EOFError, pyarrow.ArrowException, zipfile.BadZipFile, pd.errors.ParserError)
+BROKEN = (ValueError, KeyError, EOFError, pyarrow.ArrowException, zipfile.BadZipFile, pd.errors.ParserWarning)
 
 
 def read_table(path: pathlib.Path, joint_names: tuple[str, ...]) -> tuple[dict[str, np.ndarray], list[str]]:
@@ -71,10 +72,9 @@ def _csv_table(path: pathlib.Path, notes: list[str]) -> dict[str, np.ndarray]:
         name = {";": "semicolons", "\t": "tabs"}.get(separator, "blanks")
         notes.append(f"The columns are parted by {name} instead of commas; read so")
     names = [n.strip().strip('"').strip() for n in re.split(separator, header.lstrip("# "))]
-    # A trailing separator makes an empty last name; its column holds nothing.
-    while names and not names[-1]:
-        names.pop()
-    if names and all(_is_number(n.replace(decimal, ".")) for n in names):
+    # A separator at the end of the line makes an empty last name; its column holds nothing.
+    names = [name or f"unnamed {i}" for i, name in enumerate(names)]
+    if all(_is_number(n.replace(decimal, ".")) for n in names):
         raise RecordingError(f"{path}: row 1 holds numbers where names are needed ({', '.join(names[:3])} ...); put a "
                              "header line t, q.<joint>, tau.<joint> on top, or name the columns there and map them "
                              "with --columns")
@@ -82,9 +82,12 @@ def _csv_table(path: pathlib.Path, notes: list[str]) -> dict[str, np.ndarray]:
     if twice:
         raise RecordingError(f"{path}: column {twice[0]} is there {names.count(twice[0])} times; every name may come "
                              "once")
-    frame = pd.read_csv(path, sep=separator, decimal=decimal, header=None, names=names, skiprows=1, index_col=False,
-                        skipinitialspace=True, encoding="utf-8-sig", low_memory=False, comment="#", usecols=names)
-    return _frame_columns(frame)
+    with warnings.catch_warnings():
+        # Rows with more values than there are names would be cut off with a mere warning.
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        frame = pd.read_csv(path, sep=separator, decimal=decimal, header=None, names=names, skiprows=1,
+                            index_col=False, skipinitialspace=True, encoding="utf-8-sig", low_memory=False, comment="#")
+    return _frame_columns(frame.drop(columns=[n for n in names if n.startswith("unnamed ") and frame[n].isna().all()]))
 
 
 def _frame_columns(frame: pd.DataFrame) -> dict[str, np.ndarray]:

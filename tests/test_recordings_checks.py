@@ -1,0 +1,253 @@
+"""Recordings that contradict themselves or the robot are refused; odd but honest ones pass."""
+
+import dataclasses
+import pathlib
+
+import helpers_recordings as made
+import mujoco
+import numpy as np
+import pytest
+
+import irb140_jax as irb
+from irb140_jax.errors import RecordingError
+from irb140_jax.recordings import Recording, read_recording, write_recording
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return made.robot()
+
+
+@pytest.fixture(scope="module")
+def sound() -> Recording:
+    return made.recording()
+
+
+def read(recording, robot, tmp_path):
+    return read_recording(write_recording(recording, tmp_path / "log.parquet"), robot)
+
+
+def changed(recording, **fields):
+    return dataclasses.replace(recording, **fields)
+
+
+def refusal(recording, robot, tmp_path) -> str:
+    with pytest.raises(RecordingError) as caught:
+        read(recording, robot, tmp_path)
+    message = str(caught.value)
+    assert "\n" not in message and "log.parquet" in message
+    return message
+
+
+def without_speeds(recording):
+    return changed(recording, qd=None)
+
+
+# --- refused ---------------------------------------------------------------------------------------------------------
+
+
+def test_positions_in_degrees_beside_speeds_in_radians_are_recognised(sound, robot, tmp_path):
+    message = refusal(changed(sound, q=np.degrees(sound.q)), robot, tmp_path)
+    assert "q.shoulder is in degrees and qd.shoulder in radians" in message and '"q.shoulder" = "deg"' in message
+
+
+def test_speeds_in_degrees_are_recognised(sound, robot, tmp_path):
+    message = refusal(changed(sound, qd=np.degrees(sound.qd)), robot, tmp_path)
+    assert "qd.shoulder in degrees" in message and '"qd.shoulder" = "deg"' in message
+
+
+@pytest.mark.parametrize("speeds", [True, False])
+@pytest.mark.parametrize("seed", range(4))
+def test_everything_in_degrees_is_recognised(robot, tmp_path, speeds, seed):
+    sound = made.recording(seed=seed)
+    degrees = changed(sound, q=np.degrees(sound.q), qd=np.degrees(sound.qd) if speeds else None)
+    assert "look like degrees" in refusal(degrees, robot, tmp_path).replace("looks", "look")
+
+
+def test_a_small_motion_in_degrees_within_the_limits_is_recognised_by_its_torque(robot, tmp_path):
+    sound = made.recording(size=0.05, speeds=False, friction=0.05)
+    degrees = changed(sound, q=np.degrees(sound.q))
+    assert np.max(np.abs(degrees.q)) < 2 * np.pi, "so small that the joint limits do not show it"
+    assert "look like degrees" in refusal(degrees, robot, tmp_path)
+
+
+def test_one_joint_on_the_motor_side_is_recognised(sound, robot, tmp_path):
+    q = sound.q * np.array([1.0, 50.0, 1.0])
+    assert "column q.elbow reaches" in refusal(changed(sound, q=q, qd=None), robot, tmp_path)
+
+
+def test_exchanged_speeds_are_recognised(sound, robot, tmp_path):
+    message = refusal(changed(sound, qd=sound.qd[:, [0, 2, 1]]), robot, tmp_path)
+    assert "qd.wrist follows q.elbow" in message and "qd.elbow follows q.wrist" in message
+
+
+def test_reversed_speeds_are_recognised(sound, robot, tmp_path):
+    message = refusal(changed(sound, qd=sound.qd * np.array([1, -1, 1])), robot, tmp_path)
+    assert "column qd.elbow has the opposite sign" in message
+
+
+def test_speeds_of_another_scale_are_recognised(sound, robot, tmp_path):
+    assert "does not fit q.shoulder" in refusal(changed(sound, qd=sound.qd / 7), robot, tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("pair", [[1, 0, 2], [0, 2, 1], [2, 1, 0]])
+def test_exchanged_torques_are_recognised(robot, tmp_path, seed, pair):
+    sound = made.recording(seed=seed)
+    a, b = (sound.joint_names[k] for k in np.flatnonzero(np.array(pair) != np.arange(3)))
+    message = refusal(changed(sound, tau=sound.tau[:, pair]), robot, tmp_path)
+    assert "exchanged" in message and f"tau.{a} fits joint {b}" in message and f"tau.{b} fits joint {a}" in message
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("joint", [0, 1, 2])
+def test_a_torque_of_the_wrong_sign_is_recognised(robot, tmp_path, seed, joint):
+    sound = made.recording(seed=seed)
+    sign = np.where(np.arange(3) == joint, -1.0, 1.0)
+    message = refusal(changed(sound, tau=sound.tau * sign), robot, tmp_path)
+    assert f"column tau.{sound.joint_names[joint]} of the wrong sign" in message and "= -1" in message
+
+
+def test_torque_on_the_motor_side_is_recognised(sound, robot, tmp_path):
+    assert "gear ratio" in refusal(changed(sound, tau=sound.tau / 100), robot, tmp_path)
+
+
+def test_a_torque_that_never_changes_while_the_joint_moves_is_refused(sound, robot, tmp_path):
+    tau = sound.tau.copy()
+    tau[:, 1] = 0.0
+    message = refusal(changed(sound, tau=tau), robot, tmp_path)
+    assert "column tau.elbow is 0 in every row" in message and "dead channel" in message
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5])
+def test_a_robot_that_does_not_move_is_refused(sound, robot, tmp_path, noise):
+    q = np.full_like(sound.q, 0.3) + noise * np.random.default_rng(0).normal(size=sound.q.shape)
+    assert "does not move" in refusal(changed(sound, q=q, qd=None), robot, tmp_path)
+
+
+# --- repaired or stated ----------------------------------------------------------------------------------------------
+
+
+def test_an_encoder_that_wraps_is_unwrapped_and_stated(sound, robot, tmp_path):
+    q = sound.q + 2.9
+    again = read(changed(sound, q=(q + np.pi) % (2 * np.pi) - np.pi), robot, tmp_path)
+    turns = (again.q - q) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.broadcast_to(np.round(turns[0]), turns.shape), atol=1e-9)
+    assert "unwrapped" in " ".join(again.notes)
+
+
+def test_single_positions_out_of_line_are_replaced_and_stated(sound, robot, tmp_path):
+    q = sound.q.copy()
+    q[[300, 900], 1] += 1.5
+    again = read(changed(sound, q=q), robot, tmp_path)
+    # Four milliseconds of this motion bend by less than this.
+    np.testing.assert_allclose(again.q, sound.q, atol=1e-3)
+    assert "q.elbow: 2 single positions out of line, the first at sample 301" in " ".join(again.notes)
+
+
+def test_a_saturated_torque_passes_and_is_stated(sound, robot, tmp_path):
+    limit = np.quantile(np.abs(sound.tau[:, 0]), 0.9)
+    again = read(changed(sound, tau=np.clip(sound.tau, -limit, limit)), robot, tmp_path)
+    assert any(note.startswith("tau.shoulder rests at its") for note in again.notes)
+
+
+def test_a_joint_beyond_its_limits_passes_and_is_stated(robot, tmp_path):
+    again = read(made.recording(size=6.0), robot, tmp_path)
+    assert "beyond the limits in the model" in " ".join(again.notes)
+
+
+# --- odd, but honest -------------------------------------------------------------------------------------------------
+
+
+def passes(recording, robot, tmp_path):
+    assert len(read(recording, robot, tmp_path).t) == len(recording.t)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_model_wrong_by_half_passes(robot, tmp_path, seed):
+    arm = made.model()
+    rng = np.random.default_rng(seed)
+    arm.body_mass[1:] *= rng.uniform(0.5, 1.5, arm.nbody - 1)
+    arm.body_ipos[1:] *= rng.uniform(0.5, 1.5, (arm.nbody - 1, 1))
+    arm.body_inertia[1:] *= rng.uniform(0.5, 1.5, (arm.nbody - 1, 1))
+    passes(made.recording(seed=seed, arm=arm), robot, tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_friction_above_everything_passes(robot, tmp_path, seed):
+    passes(made.recording(seed=seed, friction=60.0), robot, tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_above_everything_passes(robot, tmp_path, seed):
+    passes(made.recording(seed=seed, noise=300.0), robot, tmp_path)
+
+
+@pytest.mark.parametrize("gravity", [[9.81, 0, 0], [0, 6.9, -6.9], [4.9, 0, -8.5]])
+def test_a_tilted_base_passes(robot, tmp_path, gravity):
+    arm = made.model()
+    arm.opt.gravity[:] = gravity
+    passes(made.recording(arm=arm), robot, tmp_path)
+
+
+def test_a_heavy_payload_passes(robot, tmp_path):
+    arm = made.model()
+    arm.body_mass[-1] *= 10
+    passes(made.recording(arm=arm), robot, tmp_path)
+
+
+def test_a_counterbalance_that_carries_more_than_gravity_passes(robot, tmp_path):
+    sound = made.recording(friction=0.0)
+    passes(changed(sound, tau=sound.tau - 60 * np.sin(sound.q) - 80 * sound.q), robot, tmp_path)
+
+
+def test_a_joint_that_stands_still_passes_and_is_stated(sound, robot, tmp_path):
+    _, q, qd, qdd = made.motion(3)
+    for x, value in ((q, 0.4), (qd, 0.0), (qdd, 0.0)):
+        x[:, 1] = value
+    still = changed(sound, q=q, qd=qd, tau=made.rigid_torque(made.model(), q, qd, qdd))
+    assert "Joint elbow stands still" in " ".join(read(still, robot, tmp_path).notes)
+
+
+def test_a_joint_that_is_carried_along_without_power_passes(sound, robot, tmp_path):
+    drag = -0.02 * np.sign(sound.qd) + 0.01 * np.random.default_rng(0).normal(size=sound.q.shape)
+    passes(changed(sound, tau=np.where(np.arange(3) == 1, drag, sound.tau)), robot, tmp_path)
+
+
+@pytest.mark.parametrize("step", [1e-3, 5e-3])
+def test_coarse_encoders_pass(robot, tmp_path, step):
+    sound = made.recording(speeds=False)
+    passes(changed(sound, q=step * np.round(sound.q / step)), robot, tmp_path)
+
+
+def test_joints_that_move_in_step_pass(tmp_path):
+    arm = made.model()
+    t, q, qd, qdd = made.motion(1, seed=3)
+    q, qd, qdd = (np.repeat(x, 3, axis=1) * np.array([1.0, 0.8, 1.2]) for x in (q, qd, qdd))
+    tau = made.rigid_torque(arm, q, qd, qdd) + 0.5 * np.sign(qd)
+    passes(Recording(t, q, tau, ("shoulder", "elbow", "wrist"), qd=qd), made.robot(), tmp_path)
+
+
+@pytest.mark.parametrize("kind", [{"slide": True}, {"pendulum": True}])
+def test_slides_and_single_joints_pass(tmp_path, kind):
+    passes(made.recording(**kind), made.robot(**kind), tmp_path)
+
+
+def test_a_pendulum_that_turns_over_many_times_passes(tmp_path):
+    arm = made.model(pendulum=True)
+    t = np.arange(2000) / 250
+    q, qd, qdd = (x[:, None] for x in (6 * t + 0.3 * np.sin(3 * t), 6 + 0.9 * np.cos(3 * t), -2.7 * np.sin(3 * t)))
+    tau = made.rigid_torque(arm, q, qd, qdd) + 0.2 * np.sign(qd)
+    passes(Recording(t, q, tau, ("hinge",), qd=qd), made.robot(pendulum=True), tmp_path)
+
+
+def test_noisy_logged_speeds_pass(sound, robot, tmp_path):
+    noise = np.random.default_rng(0).normal(size=sound.qd.shape)
+    passes(changed(sound, qd=sound.qd + 2 * noise), robot, tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_irb_140_with_random_physics_left_out_passes(tmp_path, seed):
+    path = pathlib.Path(irb.__file__).parents[1] / "assets" / "irb140.xml"
+    arm, robot = mujoco.MjModel.from_xml_path(str(path)), irb.load_robot(path)
+    passes(made.recording(arm=arm, seed=seed, friction=2.0, noise=0.3, size=1.2), robot, tmp_path)

@@ -1,0 +1,141 @@
+"""The readers of real machines give the figures their data are known for."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+import irb140_jax as irb
+from irb140_jax.dynamics import inverse_dynamics_batch
+from irb140_jax.errors import RecordingError
+from irb140_jax.recordings import read_recording
+from irb140_jax.recordings.machines import dfki_double_pendulum as pendulum
+from irb140_jax.recordings.machines import recordings_folder, staubli_tx40, write_pendulum, write_tx40
+from irb140_jax.recordings.machines.sources import SOURCES
+
+
+def needs(machine):
+    try:
+        recordings_folder(machine)
+    except RecordingError as error:
+        return pytest.mark.skip(reason=f"needs the published recordings: {error}")
+    return pytest.mark.usefixtures()
+
+
+needs_tx40, needs_pendulum = needs("staubli_tx40"), needs("dfki_double_pendulum")
+
+
+def low_pass(x, cutoff, step):
+    return sosfiltfilt(butter(2, 2 * cutoff * step, output="sos"), x, axis=0)
+
+
+def rigid_error(robot, t, q, tau, position_cutoff, torque_cutoff, stride=1):
+    """Nominal torque less logged torque, both low-passed."""
+    step = t[1] - t[0]
+    q = low_pass(q, position_cutoff, step)
+    qd = np.gradient(q, step, axis=0)
+    qdd = np.gradient(qd, step, axis=0)
+    nominal = inverse_dynamics_batch(robot, *(jnp.asarray(x[::stride]) for x in (q, qd, qdd)))
+    return np.asarray(nominal) - low_pass(tau, torque_cutoff, step)[::stride]
+
+
+@needs_tx40
+def test_the_tx40_has_the_known_rigid_error_on_the_last_30_percent(tmp_path):
+    model, (train, test) = write_tx40(tmp_path)
+    robot = irb.load_robot(model)
+    parts = [read_recording(path, robot) for path in (train, test)]
+    t, q, tau = (np.concatenate([getattr(part, name) for part in parts]) for name in ("t", "q", "tau"))
+    error = rigid_error(robot, t, q, tau, 100.0, 20.0, stride=5)
+    rmse = np.sqrt(np.mean(error[int(0.7 * len(error)) :] ** 2, axis=0))
+    # Known to two or three digits, and the order of the filters behind them is not.
+    np.testing.assert_allclose(rmse, [18.0, 13.5, 6.5, 3.8, 1.5, 2.8], rtol=0.02)
+    assert parts[0].notes == parts[1].notes == ()
+
+
+@needs_tx40
+def test_the_tx40_is_split_in_time_without_losing_a_sample(tmp_path):
+    run = staubli_tx40.tx40_recording()
+    train, test = staubli_tx40.split_in_time(run, 0.7)
+    assert len(train.t) == 31500 and len(test.t) == 13500 and test.t[0] > train.t[-1]
+
+
+@needs_tx40
+@pytest.mark.parametrize(("wrong", "says"), [
+    ({"tau": np.array([1, 1, 1, -1, 1, 1])}, "tau.joint_4 of the wrong sign"),
+    ({"q": np.full(6, 180 / np.pi)}, "looks like degrees"),
+    ({"q": staubli_tx40.GEAR}, "looks like degrees or the motor side"),
+])
+def test_a_spoiled_tx40_run_is_refused(tmp_path, wrong, says):
+    model, _ = write_tx40(tmp_path)
+    run = staubli_tx40.tx40_recording()
+    run = dataclasses.replace(run, **{name: getattr(run, name) * factor for name, factor in wrong.items()})
+    path = irb.recordings.write_recording(run, tmp_path / "spoiled.parquet")
+    with pytest.raises(RecordingError, match=says.replace(".", r"\.")):
+        read_recording(path, irb.load_robot(model))
+
+
+def pendulum_rmse(robot, runs):
+    errors = []
+    for path in runs:
+        run = read_recording(path, robot)
+        t = np.arange(run.t[0], run.t[-1], 0.002)
+        even = [np.stack([np.interp(t, run.t, x[:, j]) for j in range(2)], axis=1) for x in (run.q, run.tau)]
+        errors.append(rigid_error(robot, t, *even, 10.0, 10.0)[150:-150])
+    return np.sqrt(np.mean(np.concatenate(errors) ** 2, axis=0))
+
+
+@needs_pendulum
+@pytest.mark.parametrize(("design", "known"), [("C.1", (0.314, 0.183)), ("A.0", (0.260, 0.182))])
+def test_the_pendulum_has_the_known_rigid_error_on_its_test_runs(tmp_path, design, known):
+    models, runs = write_pendulum(tmp_path, design)
+    robot = irb.load_robot(models["correct"])
+    tested = [runs[name] for name in pendulum.TEST_RUNS[design]]
+    # Three digits are known; the resampling that led to them is not.
+    np.testing.assert_allclose(pendulum_rmse(robot, tested), known, rtol=0.01)
+
+
+@needs_pendulum
+@pytest.mark.parametrize("design", ["C.1", "A.0"])
+def test_every_pendulum_run_is_read_with_either_model(tmp_path, design):
+    models, runs = write_pendulum(tmp_path, design)
+    for model in models.values():
+        robot = irb.load_robot(model)
+        assert robot.joint_names == pendulum.JOINTS
+        for path in runs.values():
+            assert read_recording(path, robot).extras.keys() == {"tau_con.Joint1", "tau_con.Joint2"}
+
+
+@needs_pendulum
+@pytest.mark.parametrize("design", ["C.1", "A.0"])
+def test_the_mistaken_model_has_the_pivot_inertia_at_the_centre_of_mass(tmp_path, design):
+    models, _ = write_pendulum(tmp_path, design)
+    right, wrong = (irb.load_robot(models[key]) for key in ("correct", "mistake"))
+    about_pivot = right.inertia[:, 0, 0] + right.mass * np.sum(np.asarray(right.com) ** 2, axis=1)
+    np.testing.assert_allclose(wrong.inertia[:, 0, 0], about_pivot, rtol=1e-9)
+
+
+def test_a_place_without_the_recordings_says_how_to_get_them(tmp_path, monkeypatch):
+    monkeypatch.setenv("IRB140_RECORDINGS", str(tmp_path))
+    with pytest.raises(RecordingError, match=r"machines\.fetch FOLDER.*thanhndv212/figaroh-plus.*IRB140_RECORDINGS"):
+        recordings_folder("staubli_tx40")
+
+
+def test_a_published_file_that_was_changed_is_refused(tmp_path):
+    (tmp_path / "pos_read_data.csv").write_text("Joint_1\n0\n")
+    with pytest.raises(RecordingError, match="SHA-256"):
+        staubli_tx40.tx40_recording(tmp_path)
+
+
+def test_an_unknown_machine_or_design_is_refused_with_the_known_ones():
+    with pytest.raises(RecordingError, match="allowed is staubli_tx40, dfki_double_pendulum"):
+        recordings_folder("puma")
+    with pytest.raises(RecordingError, match=r"allowed is C\.1, A\.0"):
+        pendulum.pendulum_runs("B")
+
+
+def test_every_source_is_pinned_to_a_commit_and_a_hash():
+    for source in SOURCES.values():
+        assert len(source.commit) == 40
+        assert all(len(sha256) == 64 and path for path, sha256 in source.files.values())
