@@ -29,7 +29,7 @@ def in_chunks(kernel: Kernel, given: Any, samples: tuple[Float[Array, "T ..."], 
         given: Pytree passed on as it is.
         samples: Arrays of T samples.
     """
-    if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((given, samples))):
+    if is_traced(given, samples):
         return _traced(kernel, given, samples)
     arrays = [np.asarray(x, float) for x in samples]
     size = arrays[0].shape[0]
@@ -42,12 +42,37 @@ def in_chunks(kernel: Kernel, given: Any, samples: tuple[Float[Array, "T ..."], 
     return jnp.asarray(result)
 
 
+def sum_of_chunks(kernel: Kernel, given: Any, samples: tuple[Float[Array, "T ..."], ...]) -> Float[Array, "..."]:
+    """Sum of kernel(given, *samples) over chunks of the samples, which the kernel sums over within a chunk.
+
+    As `in_chunks`; samples that pad the last chunk are zero and must not add to the sum.
+    """
+    if is_traced(given, samples):
+        return _traced_sum(kernel, given, samples)
+    arrays = [np.asarray(x, float) for x in samples]
+    pieces = [_piece_sum(kernel, given, [x[k : k + SEGMENT] for x in arrays]) for k in range(0, len(arrays[0]), SEGMENT)]
+    return sum(pieces[1:], pieces[0])
+
+
+def is_traced(*trees: Any) -> bool:
+    """Whether any array in there is a tracer: then its size is all that can be known."""
+    return any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(trees))
+
+
 def _piece(kernel: Kernel, given: Any, arrays: list[np.ndarray]) -> np.ndarray:
-    size = arrays[0].shape[0]
-    chunks = -(-size // CHUNK)
+    padded, chunks = _roomy(arrays)
+    return np.asarray(_loop(kernel, given, padded, chunks))[: arrays[0].shape[0]]
+
+
+def _piece_sum(kernel: Kernel, given: Any, arrays: list[np.ndarray]) -> Array:
+    return _sum_loop(kernel, given, *_roomy(arrays))
+
+
+def _roomy(arrays: list[np.ndarray]) -> tuple[list[np.ndarray], np.int32]:
+    """The arrays in one of the two sizes that are compiled, and the number of chunks in use."""
+    chunks = -(-arrays[0].shape[0] // CHUNK)
     room = CHUNK if chunks <= 1 else SEGMENT
-    padded = [_padded(x, chunks * CHUNK, room) for x in arrays]
-    return np.asarray(_loop(kernel, given, padded, np.int32(chunks)))[:size]
+    return [_padded(x, chunks * CHUNK, room) for x in arrays], np.int32(chunks)
 
 
 def _padded(x: np.ndarray, used: int, room: int) -> np.ndarray:
@@ -63,19 +88,46 @@ def _padded(x: np.ndarray, used: int, room: int) -> np.ndarray:
 @partial(jax.jit, static_argnums=0)
 def _loop(kernel: Kernel, given: Any, arrays: list[Array], chunks: Array) -> Array:
     """The first `chunks` chunks of the result; their number is not part of the program."""
-    part = lambda k: [lax.dynamic_slice_in_dim(x, k * CHUNK, CHUNK) for x in arrays]  # noqa: E731
-    shape = jax.eval_shape(lambda: kernel(given, *part(0)))
+    shape = jax.eval_shape(lambda: kernel(given, *_chunk(arrays, 0)))
     result = jnp.zeros((arrays[0].shape[0], *shape.shape[1:]), shape.dtype)
-    step = lambda k, out: lax.dynamic_update_slice_in_dim(out, kernel(given, *part(k)), k * CHUNK, 0)  # noqa: E731
+
+    def step(k: Array, out: Array) -> Array:
+        return lax.dynamic_update_slice_in_dim(out, kernel(given, *_chunk(arrays, k)), k * CHUNK, 0)
+
     return lax.fori_loop(0, chunks, step, result)
+
+
+@partial(jax.jit, static_argnums=0)
+def _sum_loop(kernel: Kernel, given: Any, arrays: list[Array], chunks: Array) -> Array:
+    """Sum over the first `chunks` chunks; their number is not part of the program."""
+    shape = jax.eval_shape(lambda: kernel(given, *_chunk(arrays, 0)))
+    step = lambda k, total: total + kernel(given, *_chunk(arrays, k))  # noqa: E731
+    return lax.fori_loop(0, chunks, step, jnp.zeros(shape.shape, shape.dtype))
+
+
+def _chunk(arrays: list[Array], k: Array | int) -> list[Array]:
+    return [lax.dynamic_slice_in_dim(x, k * CHUNK, CHUNK) for x in arrays]
 
 
 def _traced(kernel: Kernel, given: Any, samples: tuple[Array, ...]) -> Array:
     size = samples[0].shape[0]
     if size <= CHUNK:
         return kernel(given, *samples)
-    chunks = -(-size // CHUNK)
-    padded = [jnp.pad(x, [(0, chunks * CHUNK - size)] + [(0, 0)] * (x.ndim - 1)) for x in samples]
-    stacked = [x.reshape(chunks, CHUNK, *x.shape[1:]) for x in padded]
-    _, result = lax.scan(lambda carry, part: (carry, kernel(given, *part)), None, stacked)
-    return result.reshape(chunks * CHUNK, *result.shape[2:])[:size]
+    _, result = lax.scan(lambda carry, part: (carry, kernel(given, *part)), None, _stacked(samples))
+    return result.reshape(-1, *result.shape[2:])[:size]
+
+
+def _traced_sum(kernel: Kernel, given: Any, samples: tuple[Array, ...]) -> Array:
+    if samples[0].shape[0] <= CHUNK:
+        return kernel(given, *samples)
+    stacked = _stacked(samples)
+    shape = jax.eval_shape(lambda: kernel(given, *(x[0] for x in stacked)))
+    start = jnp.zeros(shape.shape, shape.dtype)
+    return lax.scan(lambda total, part: (total + kernel(given, *part), None), start, stacked)[0]
+
+
+def _stacked(samples: tuple[Array, ...]) -> list[Array]:
+    """Samples in whole chunks, (T, ...) -> (chunks, CHUNK, ...), padded with zeros."""
+    spare = -samples[0].shape[0] % CHUNK
+    padded = [jnp.pad(x, [(0, spare)] + [(0, 0)] * (x.ndim - 1)) for x in samples]
+    return [x.reshape(-1, CHUNK, *x.shape[1:]) for x in padded]

@@ -1,9 +1,13 @@
 """Forward dynamics: accelerations from torques."""
 
 import jax
-import jax.numpy as jnp
+import jax.scipy.linalg
 
-from irb140_jax.dynamics.newton_euler import inverse_dynamics
+from irb140_jax.dynamics.chain import Plan, chain, plan
+from irb140_jax.dynamics.mass import mass_matrix
+from irb140_jax.dynamics.newton_euler import rigid_torque
+from irb140_jax.dynamics.passive import passive_torque
+from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.robot import Robot
 from irb140_jax.types import Joints
 
@@ -20,9 +24,14 @@ def forward_dynamics(robot: Robot, q: Joints, qd: Joints, tau: Joints) -> Joints
     Returns:
         Joint accelerations [rad/s^2 or m/s^2].
 
-    Source: Walker, Orin (1982), method 1: the columns of M are inverse dynamics of unit accelerations.
+    Source: Featherstone, Rigid Body Dynamics Algorithms (2008), sec. 6.1, inertia matrix method.
     """
-    torque = lambda qdd: inverse_dynamics(robot, q, qd, qdd)  # noqa: E731
-    bias, columns = jax.vmap(torque)(jnp.zeros((1, robot.n)))[0], jax.vmap(torque)(jnp.eye(robot.n))
-    M = columns - bias
+    return _forward_dynamics(robot, plan(robot), q, qd, tau)
+
+
+@jax.jit
+def _forward_dynamics(robot: Robot, ahead: Plan, q: Joints, qd: Joints, tau: Joints) -> Joints:
+    # Stored apart, so that XLA compiles the mass matrix and the bias as two programs rather than one entangled.
+    M = staged(always(q, qd), lambda: mass_matrix(robot, q))
+    bias = rigid_torque(chain(robot, ahead), q, qd, None) + passive_torque(robot, q, qd)
     return jax.scipy.linalg.solve(M, tau - bias, assume_a="pos")

@@ -158,8 +158,11 @@ def _inverse_dynamics(robot: Robot, ahead: Plan, q: Joints, qd: Joints, qdd: Joi
     return rigid + robot.armature * qdd + passive_torque(robot, q, qd)
 
 
-def rigid_torque(arm: Chain, q: Float[Array, "n *T"], qd: Float[Array, "n *T"], qdd: Float[Array, "n *T"]):
-    """Torques of the rigid bodies alone, shape (n,) for one sample, (n, T) for a batch."""
-    predicate = always(q, qd, qdd)
-    torques = inward(*outward(arm, list(q), list(qd), list(qdd), predicate), predicate)
+def rigid_torque(
+    arm: Chain, q: Float[Array, "n *T"], qd: Float[Array, "n *T"], qdd: Float[Array, "n *T"] | None
+) -> Float[Array, "n *T"]:
+    """Torques of the rigid bodies alone, shape (n,) for one sample, (n, T) for a batch; qdd = 0 if it is None."""
+    predicate = always(q, qd)
+    accelerations = [0.0] * len(arm.links) if qdd is None else list(qdd)
+    torques = inward(*outward(arm, list(q), list(qd), accelerations, predicate), predicate)
     return jnp.stack([jnp.broadcast_to(jnp.asarray(x, q.dtype), q.shape[1:]) for x in torques])

@@ -54,7 +54,7 @@ def regressor_blocks(
     arm: Chain, q: Float[Array, "n *T"], qd: Float[Array, "n *T"], qdd: Float[Array, "n *T"]
 ) -> Blocks:
     """Ten scalars Y[j, i] for every joint j and every link i >= j that it carries; shapes (n,) or (n, T)."""
-    predicate = always(q, qd, qdd)
+    predicate = always(q, qd)
     places, motions = outward(arm, list(q), list(qd), list(qdd), predicate)
     blocks: Blocks = {}
     screws: list[tuple[Vector, Vector]] = []

@@ -1,0 +1,57 @@
+"""Normal equations of a whole recording without its regressor in memory."""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from irb140_jax.dynamics.chain import Plan, chain, plan
+from irb140_jax.dynamics.chunks import sum_of_chunks
+from irb140_jax.dynamics.regressor import regressor_blocks
+from irb140_jax.dynamics.scalars import is_known
+from irb140_jax.robot import Robot
+from irb140_jax.types import JointSamples
+
+
+def regressor_gram(
+    robot: Robot,
+    q: JointSamples,
+    qd: JointSamples,
+    qdd: JointSamples,
+    tau: JointSamples,
+    weight: JointSamples | None = None,
+) -> Float[Array, "10*n+1 10*n+1"]:
+    """Gram matrix W^T W of W = diag(weight) [Y, tau], stacked over all samples and joints.
+
+    All that least squares needs: Y^T Y phi = Y^T tau, and the squared residual from the last diagonal entry.  The rows
+    of joint j are zero for links before j, so their products are formed of the later columns only.
+
+    Args:
+        robot: Arm with n joints; its inertial parameters don't matter here.
+        q: Joint positions [rad or m], shape (T, n).
+        qd: Joint velocities [rad/s or m/s], shape (T, n).
+        qdd: Joint accelerations [rad/s^2 or m/s^2], shape (T, n).
+        tau: Torques to explain [N m or N], shape (T, n).
+        weight: Weight of each sample's equation, shape (T, n); 1 if not given.
+
+    Returns:
+        The matrix, columns as in `robot.phi.ravel()`, then tau.
+
+    Source: Gautier (1997), Dynamic identification of robots with power model, sec. 3 (normal equations, recursively).
+    """
+    weights = jnp.ones_like(tau) if weight is None else weight
+    given = (robot, plan(robot, regrouped=False))
+    return sum_of_chunks(_gram_of_chunk, given, (q, qd, qdd, tau, weights))
+
+
+def _gram_of_chunk(given: tuple[Robot, Plan], q, qd, qdd, tau, weight) -> Float[Array, "10*n+1 10*n+1"]:
+    n = q.shape[1]
+    blocks = regressor_blocks(chain(*given), q.T, qd.T, qdd.T)
+    gram = jnp.zeros((10 * n + 1, 10 * n + 1), q.dtype)
+    for j in range(n):
+        columns = {10 * i + k: x for i in range(j, n) for k, x in enumerate(blocks[j, i]) if not is_known(x, 0.0)}
+        columns[10 * n] = tau[:, j]
+        rows = jnp.stack([jnp.broadcast_to(jnp.asarray(x, q.dtype), tau.shape[:1]) for x in columns.values()])
+        rows = rows * weight[:, j]
+        at = np.array(list(columns))
+        gram = gram.at[at[:, None], at].add(rows @ rows.T)
+    return gram
