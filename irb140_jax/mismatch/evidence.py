@@ -8,6 +8,7 @@ up to a constant that all sets share.  Inertial parameters are always in; they a
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import linalg
@@ -101,27 +102,50 @@ def posterior(H: np.ndarray, columns: np.ndarray) -> Posterior:
     return Posterior(columns, cov @ H[columns, -1], cov)
 
 
-def gains(H: np.ndarray, candidates: list[Candidate], offset: int) -> tuple[np.ndarray, np.ndarray]:
-    """Log evidence that each candidate adds, and whether its amplitudes stay within what is admissible.
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    """Candidates with equally many amplitudes: which they are, and their columns in a Gram matrix (candidates, k)."""
+
+    which: np.ndarray
+    columns: np.ndarray
+
+
+def layouts(candidates: Sequence[Candidate], offset: int) -> tuple[Layout, ...]:
+    """Group candidates by their number of amplitudes, so that each group is one batched solve."""
+    sizes = np.array([len(c.columns) for c in candidates])
+    out = []
+    for k in np.unique(sizes):
+        which = np.flatnonzero(sizes == k)
+        out.append(Layout(which, np.stack([candidates[i].columns for i in which]) + offset))
+    return tuple(out)
+
+
+def gains(H: np.ndarray, groups: Sequence[Layout], count: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Log evidence that each candidate adds, and the amplitudes it would get.
 
     Args:
         H: Gram matrix with everything else eliminated.
-        candidates: What to try.
-        offset: Column at which the candidates' amplitudes start.
+        groups: Candidates to try, from `layouts`.
+        count: Number of all candidates.
+        width: Largest number of amplitudes.
 
     Returns:
-        Gains, shape (len(candidates),); the fitted amplitudes in prior units, padded with NaN, shape (..., k).
+        Gains, shape (count,), -inf for those not tried; amplitudes in prior units, padded with NaN, (count, width).
     """
-    width = max((len(c.columns) for c in candidates), default=1)
-    gain, mean = np.zeros(len(candidates)), np.full((len(candidates), width), np.nan)
-    for k in range(1, width + 1):
-        which = np.flatnonzero([len(c.columns) == k for c in candidates])
-        if len(which) == 0:
-            continue
-        index = np.stack([candidates[i].columns for i in which]) + offset
+    gain, mean = np.full(count, -np.inf), np.full((count, width), np.nan)
+    for group in groups:
+        index, k = group.columns, group.columns.shape[1]
         M = H[index[:, :, None], index[:, None, :]] + np.eye(k)
         b = H[index, -1]
-        v = np.linalg.solve(M, b[..., None])[..., 0]
-        gain[which] = 0.5 * np.einsum("ik,ik->i", b, v) - 0.5 * np.linalg.slogdet(M)[1]
-        mean[which, :k] = v
+        v = np.linalg.solve(M, b[..., None])[..., 0] if k > 1 else b / M[:, 0]
+        logdet = np.linalg.slogdet(M)[1] if k > 1 else np.log(M[:, 0, 0])
+        gain[group.which] = 0.5 * np.einsum("ik,ik->i", b, v) - 0.5 * logdet
+        mean[group.which, :k] = v
     return gain, mean
+
+
+def gain_of(H: np.ndarray, columns: np.ndarray) -> float:
+    """Log evidence that one group of amplitudes adds."""
+    M = H[np.ix_(columns, columns)] + np.eye(len(columns))
+    b = H[columns, -1]
+    return 0.5 * float(b @ np.linalg.solve(M, b)) - 0.5 * float(np.linalg.slogdet(M)[1])

@@ -7,10 +7,9 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.evidence import eliminated, gains
+from irb140_jax.mismatch.evidence import eliminated
 from irb140_jax.mismatch.explain import Explanation, full_posterior
-from irb140_jax.mismatch.name import group_odds
+from irb140_jax.mismatch.name import PREFER, group_odds
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
 from irb140_jax.robot import Robot
 
@@ -83,7 +82,7 @@ def _shape_variance(ex: Explanation, index: int) -> np.ndarray:
     if not c.effect.refines():
         return np.zeros(len(c.shape))
     alike = [i for i, o in enumerate(ex.data.candidates) if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant]
-    gain = ex.problem.scores(ex.problem.without(ex.chosen, index))[alike]
+    gain = ex.problem.scores(ex.problem.without(_others(ex, index)))[alike]
     x = np.array([float(ex.data.candidates[i].shape[0]) for i in alike])
     finite = np.isfinite(gain)
     if finite.sum() < 3:
@@ -98,7 +97,7 @@ def _shape_variance(ex: Explanation, index: int) -> np.ndarray:
 
 
 def _evidence(ex: Explanation, index: int) -> dict[str, float]:
-    H = ex.problem.without(ex.chosen, index)
+    H = ex.problem.without(_others(ex, index))
     columns = ex.data.candidates[index].columns + ex.problem.offset
     M = H[np.ix_(columns, columns)]
     drop = float(H[columns, -1] @ np.linalg.lstsq(M, H[columns, -1], rcond=1e-12)[0])
@@ -109,7 +108,7 @@ def _evidence(ex: Explanation, index: int) -> dict[str, float]:
 def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], float]:
     """Log odds of every effect that could stand in a finding's place, and of none (slug "")."""
     c = ex.data.candidates[index]
-    H = ex.problem.without(ex.chosen, index)
+    H = ex.problem.without(_others(ex, index))
     odds = {
         key: value
         for key, value in group_odds(ex.problem, H).items()
@@ -118,13 +117,17 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
     odds["", ()] = 0.0
     guard = ex.problem.guard(ex.chosen)[list(c.joints)].max()
     own = odds[c.slug, c.joints]
-    # Differences within what an imperfect law could feign do not count against a rival.
-    return {k: v if k == (c.slug, c.joints) or not k[0] else v + min(guard, max(own - v, 0.0)) * _alike(c, k) for k, v in odds.items()}
+    # Within what an imperfect law could feign, a rival is as good as the named law; a special case has already lost by
+    # more than that, and a law that contains the named one was not needed.
+    for key, value in odds.items():
+        if key[0] and key != (c.slug, c.joints) and key[0] not in c.effect.contains:
+            within = guard + PREFER if value > own else guard * (c.slug not in CATALOGUE[key[0]].contains)
+            odds[key] = own if abs(value - own) <= within else value
+    return odds
 
 
-def _alike(c: Candidate, key: tuple[str, tuple[int, ...]]) -> float:
-    """1 for laws that the named one does not contain: a contained law has already lost by more than the guard."""
-    return 0.0 if key[0] in c.effect.contains or c.slug in CATALOGUE[key[0]].contains else 1.0
+def _others(ex: Explanation, index: int) -> tuple[int, ...]:
+    return tuple(c for c in ex.chosen if c != index)
 
 
 def _shares(odds: dict) -> dict:
@@ -189,7 +192,7 @@ def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any
     rows = []
     chosen = {(ex.data.candidates[c].slug, ex.data.candidates[c].joints) for c in ex.chosen}
     # Alone: over nothing but the inertials, with the noise of the final model.
-    chi, _ = gains(ex.problem.H, list(ex.data.candidates), ex.problem.offset)
+    chi = ex.problem.scores(ex.problem.H) - ex.problem.log_prior
     best: dict[tuple[str, tuple[int, ...]], float] = {}
     for c, gain in zip(ex.data.candidates, chi, strict=True):
         best[c.slug, c.joints] = max(best.get((c.slug, c.joints), -np.inf), float(gain))

@@ -3,11 +3,13 @@
 import dataclasses
 import itertools
 from collections import defaultdict
+from collections.abc import Collection, Iterable
+from functools import cached_property
 
 import numpy as np
 
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.evidence import eliminated, gains, posterior
+from irb140_jax.mismatch.evidence import Layout, eliminated, gain_of, gains, layouts, posterior
 
 ACCEPT = np.log(100.0)  # posterior odds a finding needs; under the null, a bound of 1 % on a false one (Markov)
 PREFER = np.log(20.0)  # odds at which a law replaces the simpler one that it contains
@@ -43,16 +45,47 @@ class Problem:
         parts = [self.candidates[c].columns + self.offset for c in chosen]
         return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
 
-    def without(self, chosen: tuple[int, ...], *drop: int) -> np.ndarray:
-        """Gram matrix with a set, less some of it, eliminated."""
-        return eliminated(self.H, self.columns(tuple(c for c in chosen if c not in drop)))[0]
+    def without(self, chosen: tuple[int, ...]) -> np.ndarray:
+        """Gram matrix with a set eliminated."""
+        return eliminated(self.H, self.columns(chosen))[0]
 
-    def scores(self, H: np.ndarray) -> np.ndarray:
-        """Log posterior odds of adding each candidate; -inf where its amplitudes would be inadmissible."""
-        gain, mean = gains(H, list(self.candidates), self.offset)
-        std = 1.0  # prior units: an amplitude is inadmissible only if it lies clearly on the wrong side
-        bad = np.any(mean < self.lowest - 1e-9 * std, axis=1)
+    @cached_property
+    def groups(self) -> tuple[Layout, ...]:
+        """All candidates, in groups of equal size."""
+        return layouts(self.candidates, self.offset)
+
+    @cached_property
+    def at_joint(self) -> np.ndarray:
+        """Which candidates touch which joint, shape (n, candidates)."""
+        touches = np.zeros((len(self.per_joint), len(self.candidates)), dtype=bool)
+        for i, c in enumerate(self.candidates):
+            touches[list(c.joints), i] = True
+        return touches
+
+    def scores(self, H: np.ndarray, joints: Collection[int] | None = None) -> np.ndarray:
+        """Log posterior odds of adding each candidate; -inf where its amplitudes would be inadmissible.
+
+        Args:
+            H: Gram matrix with the rest of the set eliminated.
+            joints: Only candidates that touch these joints; all by default.
+        """
+        groups = self.groups
+        if joints is not None:
+            near = self.at_joint[list(joints)].any(axis=0)
+            groups = [Layout(g.which[near[g.which]], g.columns[near[g.which]]) for g in groups if near[g.which].any()]
+        gain, mean = gains(H, groups, len(self.candidates), self.lowest.shape[1])
+        with np.errstate(invalid="ignore"):
+            bad = np.any(mean < self.lowest - 1e-9, axis=1)
         return np.where(bad, -np.inf, gain + self.log_prior)
+
+    def odds(self, H: np.ndarray, chosen: Iterable[int]) -> float:
+        """Log posterior odds of a set against the empty one, given what H has eliminated."""
+        total = 0.0
+        for c in chosen:
+            columns = self.candidates[c].columns + self.offset
+            total += gain_of(H, columns) + self.log_prior[c]
+            H, _ = eliminated(H, columns)
+        return total
 
     def guard(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Log odds that imperfect laws could feign at each joint, shape (n,)."""
@@ -67,10 +100,22 @@ class Problem:
 def search(problem: Problem, start: tuple[int, ...] = ()) -> tuple[int, ...]:
     """The set of candidates with the best posterior odds that simpler sets do not match.
 
-    Forward steps, each followed by exchanges (one or two members for one), simplifications and removals until nothing
-    improves.
+    Forward steps, each followed by exchanges (one or two members for one), simplifications and removals among the
+    joints it touched, and at the end among all, until nothing improves.
     """
     chosen = _settled(problem, start)
+    for _ in range(2):
+        grown = _grown(problem, chosen)
+        settled = _settled(problem, grown)
+        if settled == chosen:
+            break
+        chosen = settled
+    return chosen
+
+
+def _grown(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    """Add the best candidate, settle around it, and again, until none is worth adding."""
+    seen: set[frozenset[int]] = set()
     while len(chosen) < MOST:
         scores = problem.scores(problem.without(chosen)) - _hurdle(problem, chosen) - ACCEPT
         scores[list(chosen)] = -np.inf
@@ -78,109 +123,100 @@ def search(problem: Problem, start: tuple[int, ...] = ()) -> tuple[int, ...]:
         best = int(np.argmax(scores))
         if scores[best] <= 0:
             break
-        chosen = _settled(problem, (*chosen, best))
+        chosen = _settled(problem, (*chosen, best), set(problem.candidates[best].joints))
+        if frozenset(chosen) in seen:
+            break  # adding and settling undo each other
+        seen.add(frozenset(chosen))
     return chosen
-
-
-def total_score(problem: Problem, chosen: tuple[int, ...]) -> float:
-    """Log posterior odds of a set against the empty one."""
-    H, total = problem.H, 0.0
-    for c in chosen:
-        gain, _ = gains(H, [problem.candidates[c]], problem.offset)
-        total += float(gain[0]) + problem.log_prior[c]
-        H, _ = eliminated(H, problem.candidates[c].columns + problem.offset)
-    return total
 
 
 def _hurdle(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
     """Guard of each candidate: of the most suspect joint it touches."""
-    guard = problem.guard(chosen)
-    return np.array([guard[list(c.joints)].max() for c in problem.candidates])
+    return np.max(np.where(problem.at_joint, problem.guard(chosen)[:, None], 0.0), axis=0)
 
 
 def _conflicts(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
     """Candidates that can't stand beside the set: the same effect at the site, or one that contains or is contained."""
-    taken = [problem.candidates[c] for c in chosen]
-    by_site = defaultdict(set)
-    for c in taken:
-        by_site[c.joints] |= {c.slug, *c.effect.contains}
-    containers = defaultdict(set)
-    for c in taken:
-        containers[c.joints].add(c.slug)
+    taken: dict[tuple[int, ...], set[str]] = defaultdict(set)
+    contained: dict[tuple[int, ...], set[str]] = defaultdict(set)
+    for c in (problem.candidates[i] for i in chosen):
+        taken[c.joints].add(c.slug)
+        contained[c.joints] |= set(c.effect.contains)
     return np.array([
-        c.slug in by_site[c.joints] or bool(set(c.effect.contains) & containers[c.joints])
+        c.slug in taken[c.joints] | contained[c.joints] or bool(set(c.effect.contains) & taken[c.joints])
         for c in problem.candidates
     ])  # fmt: skip
 
 
-def _settled(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
-    """Exchange, simplify and remove until nothing improves."""
+def _settled(problem: Problem, chosen: tuple[int, ...], joints: set[int] | None = None) -> tuple[int, ...]:
+    """Exchange, simplify and remove until nothing improves, among the members at some joints or all."""
     for _ in range(30):
-        changed = _exchange(problem, chosen) or _simplify(problem, chosen) or _remove(problem, chosen)
+        near = tuple(c for c in chosen if joints is None or joints & set(problem.candidates[c].joints))
+        changed = _exchange(problem, chosen, near) or _simplify(problem, chosen, near) or _remove(problem, chosen, near)
         if changed is None:
             return chosen
         chosen = changed
     return chosen
 
 
-def _exchange(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...] | None:
+def _exchange(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) -> tuple[int, ...] | None:
     """The best replacement of one or two members by one candidate that shares a joint with them."""
     hurdle = _hurdle(problem, chosen)
     best, best_move = 1e-6, None
-    drops = [(c,) for c in chosen]
-    drops += [
-        pair for pair in itertools.combinations(chosen, 2)
-        if set(problem.candidates[pair[0]].joints) & set(problem.candidates[pair[1]].joints)
-    ]  # fmt: skip
-    for drop in drops:
-        H = problem.without(chosen, *drop)
-        scores = problem.scores(H)
+    pairs = [p for p in itertools.combinations(near, 2)
+             if problem.candidates[p[0]].joints == problem.candidates[p[1]].joints]  # fmt: skip
+    for drop in [*((c,) for c in near), *pairs]:
         rest = tuple(c for c in chosen if c not in drop)
-        removed = total_score(dataclasses.replace(problem, H=H), drop)
-        old_columns = sum(len(problem.candidates[c].columns) for c in drop)
-        joints = set().union(*(problem.candidates[c].joints for c in drop))
-        blocked = _conflicts(problem, rest)
-        for i, c in enumerate(problem.candidates):
-            if blocked[i] or i in drop or not joints & set(c.joints):
-                continue
-            richer = any(problem.candidates[d].slug in c.effect.contains for d in drop)
-            simpler = any(c.slug in problem.candidates[d].effect.contains for d in drop)
-            need = PREFER + hurdle[i] if richer or len(c.columns) > old_columns else 0.0
-            gain = scores[i] - removed - need
-            if simpler and len(drop) == 1:
+        old = [problem.candidates[c] for c in drop]
+        H = problem.without(rest)
+        scores = problem.scores(H, {j for c in old for j in c.joints}) - problem.odds(H, drop)
+        scores[_conflicts(problem, rest)] = -np.inf
+        scores[list(drop)] = -np.inf
+        for i in np.flatnonzero(scores > best):
+            c = problem.candidates[i]
+            if len(drop) == 1 and c.slug in old[0].effect.contains:
                 continue  # `_simplify` decides that
+            richer = any(o.slug in c.effect.contains for o in old)
+            more = len(c.columns) > sum(len(o.columns) for o in old)
+            gain = scores[i] - (PREFER + hurdle[i] if richer or more else 0.0)
             if gain > best:
-                best, best_move = gain, (*rest, i)
+                best, best_move = gain, (*rest, int(i))
     return best_move
 
 
-def _simplify(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...] | None:
+def _simplify(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) -> tuple[int, ...] | None:
     """Put a law's special case in its place where the difference is not clear."""
     hurdle = _hurdle(problem, chosen)
-    for d in chosen:
+    for d in near:
         member = problem.candidates[d]
-        H = problem.without(chosen, d)
-        scores = problem.scores(H)
-        own = total_score(dataclasses.replace(problem, H=H), (d,))
-        for i, c in enumerate(problem.candidates):
-            special = c.slug in member.effect.contains or (
-                c.slug == member.slug and len(c.columns) < len(member.columns) and np.array_equal(c.shape, member.shape)
+        special = [
+            i for i, c in enumerate(problem.candidates)
+            if c.joints == member.joints and (
+                c.slug in member.effect.contains
+                or c.slug == member.slug and len(c.columns) < len(member.columns)
+                and np.array_equal(c.shape, member.shape)
             )
-            if special and c.joints == member.joints and own - scores[i] < PREFER + hurdle[d]:
-                return (*(x for x in chosen if x != d), i)
+        ]  # fmt: skip
+        if not special:
+            continue
+        rest = tuple(x for x in chosen if x != d)
+        H = problem.without(rest)
+        scores = problem.scores(H, member.joints)
+        best = max(special, key=lambda i: scores[i])
+        if problem.odds(H, (d,)) - scores[best] < PREFER + hurdle[d]:
+            return (*rest, best)
     return None
 
 
-def _remove(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...] | None:
+def _remove(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) -> tuple[int, ...] | None:
     """Drop the member that is least needed, if it is not needed."""
-    odds = []
-    for d in chosen:
+    odds = {}
+    for d in near:
         rest = tuple(x for x in chosen if x != d)
-        own = total_score(dataclasses.replace(problem, H=problem.without(chosen, d)), (d,))
-        odds.append(own - _hurdle(problem, rest)[d])
-    if not odds or min(odds) >= ACCEPT:
+        odds[d] = problem.odds(problem.without(rest), (d,)) - _hurdle(problem, rest)[d]
+    if not odds or min(odds.values()) >= ACCEPT:
         return None
-    weakest = chosen[int(np.argmin(odds))]
+    weakest = min(odds, key=lambda d: odds[d])
     return tuple(x for x in chosen if x != weakest)
 
 

@@ -1,7 +1,10 @@
 """The noise of each joint's torque equation: an autoregression and a level per recording.
 
-Sensor noise, differentiated encoder noise and what the model can't follow are all coloured; least squares and evidence
-are only right on rows that have been whitened.
+Differentiated encoder noise rises with frequency, and rows must be whitened before least squares or evidence are right.
+What the model can't follow is the other way round: large at low frequency.  Whitening that would amplify the high
+frequencies, where no friction law is exact (a reversal is not a step), and bias every level down.  So the noise spectrum
+used never falls with frequency: whitening where noise rises, ordinary least squares at the level of the worst where
+it falls.  Both are then conservative.
 """
 
 import dataclasses
@@ -10,6 +13,8 @@ import numpy as np
 from scipy import linalg, signal
 
 ORDER = 10  # lags; at about twice the band this spans a quarter of a second
+SPECTRUM = 256  # points of the spectrum
+RIDGE = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,12 +65,11 @@ def noise_from_residuals(residuals: list[np.ndarray], use: list[np.ndarray], dof
             for r, u, s in zip(residuals, use, scale, strict=True)
             if s > 0
         )
-        ar[j] = _whitener(np.atleast_1d(acov))
+        ar[j], innovation = _whitener(np.atleast_1d(acov))
         rows = sum(int(u[:, j].sum()) for u in use)
         inflate = np.sqrt(rows / max(rows - dof[j], 0.2 * rows, 1.0))
-        for r, (res, u) in enumerate(zip(residuals, use, strict=True)):
-            white = signal.lfilter(ar[j], [1.0], res[:, j])[Noise.usable(u[:, j])]
-            level[r, j] = inflate * (np.sqrt(np.mean(white**2)) if len(white) > 20 else 0.0)
+        for r in range(len(residuals)):
+            level[r, j] = inflate * scale[r] * innovation
             total[r, j] = inflate * scale[r]
     # A recording in which a joint never moves has no noise of its own: it takes the middling one.
     for x in (level, total):
@@ -84,11 +88,22 @@ def _autocovariance(x: np.ndarray, use: np.ndarray) -> np.ndarray:
     return out
 
 
-def _whitener(acov: np.ndarray) -> np.ndarray:
-    """Yule-Walker; a small ridge keeps the filter from amplifying what the low-pass has removed."""
+def _whitener(acov: np.ndarray) -> tuple[np.ndarray, float]:
+    """Whitening filter for a spectrum that never falls with frequency, and its innovation for unit variance."""
     if acov.shape[0] != ORDER + 1 or acov[0] <= 0:
-        return np.eye(1, ORDER + 1)[0]
-    acov = acov / acov[0] * 0.999 ** np.arange(ORDER + 1)
-    acov[0] = 1.001
-    a = linalg.solve_toeplitz(acov[:-1], acov[1:])
-    return np.concatenate([[1.0], -a])
+        return np.eye(1, ORDER + 1)[0], 1.0
+    acov = acov / acov[0]
+    a, variance = _yule_walker(acov)
+    response = np.abs(np.fft.rfft(a, SPECTRUM)) ** 2
+    rising = np.maximum.accumulate(variance / response)
+    acov = np.fft.irfft(rising, SPECTRUM)[: ORDER + 1]
+    a, variance = _yule_walker(acov)
+    return a, float(np.sqrt(variance))
+
+
+def _yule_walker(acov: np.ndarray) -> tuple[np.ndarray, float]:
+    """Autoregression with these autocovariances; a small ridge keeps it from amplifying what the low-pass removed."""
+    damped = acov.copy()
+    damped[0] *= 1.0 + RIDGE
+    a = linalg.solve_toeplitz(damped[:-1], damped[1:])
+    return np.concatenate([[1.0], -a]), float(max(damped[0] - a @ damped[1:], 1e-9 * damped[0]))
