@@ -15,7 +15,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 IRB140_XML = ROOT / "assets" / "irb140.xml"
 
 # Chains of hinges (H) and slides (S).  Few of them, so that what is compiled for one robot serves all of its kind.
-KINDS = ("H", "SHS", "HHSHHH", "HSHHSHHHSH")
+KINDS = ("H", "SHS", "HHSHHH")
+LONGEST = "HSHHSHHHSH"
 
 
 def random_robot_xml(seed: int, n: int, slides: bool = True, *, kinds: str | None = None) -> str:
