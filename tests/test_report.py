@@ -216,3 +216,22 @@ def test_the_heat_map_is_blue_below_orange_above_and_empty_where_there_are_no_da
 def test_a_line_is_broken_where_a_value_is_missing():
     drawn = svg.line_plot([0, 1, 2, 3, 4], [svg.Series("s", [0.0, 1.0, None, 1.0, 0.0], "#000")], "t", "y")
     assert re.search(r'class="line"[^>]* d="M[\d. ]+L[\d. ]+M[\d. ]+L[\d. ]+"', drawn)
+
+
+@pytest.mark.parametrize(("low", "high"), [(-4.2, -3.3), (-1.9, 0.4), (-6.0, 2.0)])
+def test_a_logarithmic_axis_has_several_ticks_and_true_labels(low, high):
+    marks = svg.log_ticks(low, high)
+    assert len(marks) >= 3
+    digits = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    for place, label in marks:
+        factor, _, exponent = label.rpartition("·") if "·" in label else ("", "", label)
+        power = exponent[2:].translate(digits) if exponent[2:].translate(digits) != exponent[2:] else None
+        value = float(factor or 1) * 10.0 ** int(power) if power is not None else float(label)
+        assert value == pytest.approx(10.0**place, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"), [(1278120.0, "1\u202f278\u202f120"), (-6.12, "−6.1"), (99.96, "100.0"), (None, "–")]
+)
+def test_evidence_keeps_a_decimal_only_where_it_decides(value, shown):
+    assert text.evidence(value) == shown

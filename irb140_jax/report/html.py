@@ -50,7 +50,7 @@ def html_report(diagnosis: Mapping, views: Mapping, reveal: Reveal | None = None
         reveal=reveal,
         maps=[{"joint": joint, **_map_pair(data)} for joint, data in views["maps"].items()],
         traces=[{"joint": joint, **_trace(data, _unit(views, joint))} for joint, data in views["traces"].items()],
-        spectra=[_spectrum(joint, data) for joint, data in views["residual_spectrum"].items()],
+        spectra=[_spectrum(joint, data, _unit(views, joint)) for joint, data in views["residual_spectrum"].items()],
         ranking=[_bars(stage, views["ranking"]) for stage in ("alone", "given the others")],
         lines={"measured": MEASURED_LINE, **MODEL_LINES},
         meanings=MODEL_TEXTS,
@@ -68,8 +68,9 @@ def _template() -> jinja2.Template:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    for show in (text.words, text.joint_list, text.number, text.with_std, text.interval_90, text.percent):
-        environment.filters[show.__name__] = show
+    environment.filters |= {show.__name__: show for show in (text.words, text.joint_list, text.evidence, text.ratio)}
+    numbers = (text.number, text.rounded_like, text.with_std, text.interval_90, text.percent)
+    environment.filters |= {show.__name__: show for show in numbers}
     return environment.get_template("report.html.j2")
 
 
@@ -100,7 +101,8 @@ def _trace(data: Mapping, unit: str) -> dict:
     models = [(name, data[name][::step], style) for name, style in MODEL_LINES.items() if name in data]
     torque = [svg.Series("measured", measured, **MEASURED_LINE)]
     torque += [svg.Series(name, y, **style) for name, y, style in models]
-    missed = [svg.Series(name, _difference(measured, y), **style) for name, y, style in models]
+    # Finer lines than above: what is missed is mostly noise, and broad lines would make a solid band of it.
+    missed = [svg.Series(name, _difference(measured, y), **{**style, "width": 0.9}) for name, y, style in models]
     return {
         "recording": data["recording"],
         "torque": Markup(svg.line_plot(t, torque, "", f"torque [{unit}]", (540, 150), x_ticks=False)),
@@ -113,10 +115,10 @@ def _difference(a: Sequence[float | None], b: Sequence[float | None]) -> list[fl
     return [None if x is None or y is None else x - y for x, y in zip(a, b, strict=True)]
 
 
-def _spectrum(joint: str, data: Mapping) -> dict:
+def _spectrum(joint: str, data: Mapping, unit: str) -> dict:
     """Spectrum of what each model misses."""
     series = [svg.Series(name, data[name], **style) for name, style in MODEL_LINES.items() if name in data]
-    drawn = svg.line_plot(data["f"], series, "frequency [Hz]", "missed torque", (340, 170), log_y=True)
+    drawn = svg.line_plot(data["f"], series, "frequency [Hz]", f"missed [{unit}/√Hz]", (340, 170), log_y=True)
     return {"joint": joint, "drawing": Markup(drawn)}
 
 

@@ -57,6 +57,17 @@ def ticks(low: float, high: float, about: int = 5) -> list[float]:
     return [k * step for k in range(first, last + 1)]
 
 
+def log_ticks(low: float, high: float) -> list[tuple[float, str]]:
+    """Place and label of ticks between powers of ten: the powers, and twice and five times them where they are few."""
+    marks = []
+    for power in range(math.floor(low), math.ceil(high) + 1):
+        exponent = str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        for m in (1, 2, 5) if high - low < 2.5 else (1,):
+            label = tick_text(m * 10.0**power) if -3 < power < 4 else f"{m}·10{exponent}".removeprefix("1·")
+            marks.append((power + math.log10(m), label))
+    return [(place, label) for place, label in marks if low <= place <= high]
+
+
 def tick_text(value: float) -> str:
     """A tick's label, with a true minus sign."""
     return f"{value:.6g}".replace("-", "−").replace("e−0", "e−")
@@ -86,11 +97,10 @@ def axes(
     """Frame, ticks and labels of a plotting area; with `log_y` its vertical data are logarithms to base ten."""
     right, bottom, middle = box.left + box.width, box.top + box.height, box.top + box.height / 2
     parts = [f'<rect x="{box.left:g}" y="{box.top:g}" width="{box.width:g}" height="{box.height:g}" class="frame"/>']
-    powers = [float(k) for k in range(math.ceil(box.y[0]), math.floor(box.y[1]) + 1)]
-    for value in powers if log_y else ticks(*box.y, about[1]):
+    for value, label in log_ticks(*box.y) if log_y else [(v, tick_text(v)) for v in ticks(*box.y, about[1])]:
         y = box.py(value)
         parts.append(f'<path class="grid" d="M{box.left:g} {y:.1f}H{right:g}"/>')
-        parts.append(text(box.left - 6, y + 3.5, tick_text(10.0**value if log_y else value), "end"))
+        parts.append(text(box.left - 6, y + 3.5, label, "end"))
     for value in ticks(*box.x, about[0]):
         x = box.px(value)
         parts.append(f'<path class="grid" d="M{x:.1f} {box.top:g}V{bottom:g}"/>')
@@ -113,7 +123,7 @@ def heat_map(title: str, grid: Grid, rows: Sequence[float], columns: Sequence[fl
         limit: Value at which the colours are full.
         unit: Unit of positions, rad or m.
     """
-    box = Box(48, 20, 174, 150, (columns[0], columns[-1]), (rows[0], rows[-1]))
+    box = Box(48, 20, 168, 150, (columns[0], columns[-1]), (rows[0], rows[-1]))
     cells: dict[int, list[str]] = {}
     for i, row in enumerate(grid):
         top, bottom = box.py(rows[i + 1]), box.py(rows[i])
@@ -129,7 +139,7 @@ def heat_map(title: str, grid: Grid, rows: Sequence[float], columns: Sequence[fl
     body.append(axes(box, f"speed [{unit}/s]", f"position [{unit}]"))
     fills = (f'<path fill="{shade(2 * step / SHADES)}" d="{"".join(d)}"/>' for step, d in sorted(cells.items()))
     body.append(f'<g shape-rendering="crispEdges">{"".join(fills)}</g>')
-    return drawing(232, 206, title, "".join(body))
+    return drawing(224, 206, title, "".join(body))
 
 
 def colour_bar(limit: float, unit: str) -> str:
@@ -143,7 +153,7 @@ def colour_bar(limit: float, unit: str) -> str:
         for k in steps
     )
     body += "".join(text(23, box.py(v) + 3.5, tick_text(v), "start") for v in ticks(-limit, limit, 5))
-    return drawing(56, 206, f"colour scale in {unit}", body + text(6, 12, unit, "start", ' class="axis"'))
+    return drawing(74, 206, f"colour scale in {unit}", body + text(6, 12, unit, "start", ' class="axis"'))
 
 
 def line_plot(

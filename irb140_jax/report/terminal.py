@@ -44,7 +44,7 @@ def print_reveal(reveal: Reveal, console: Console) -> None:
     for effect in reveal.found:
         head = (_named(effect), "[green]found[/]")
         for name, (true, value, std, unit) in effect["parameters"].items():
-            table.add_row(*head, text.words(name), text.number(true), text.with_std(value, std), unit)
+            table.add_row(*head, text.words(name), text.rounded_like(true, std), text.with_std(value, std), unit)
             head = ("", "")
     for effect in reveal.missed:
         table.add_row(_named(effect), "[red]missed[/]")

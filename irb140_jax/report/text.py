@@ -38,8 +38,10 @@ def number(x: float | None, digits: int = 3) -> str:
     return f"{round(x, decimals):.{max(decimals, 0)}f}".replace("-", "−")
 
 
-def rounded_like(x: float, std: float | None) -> str:
-    """x to the decimals that its standard deviation makes worth reading (two digits of it)."""
+def rounded_like(x: float | None, std: float | None) -> str:
+    """x to the decimals that a standard deviation makes worth reading (two digits of it)."""
+    if x is None:
+        return "–"
     if std is None or not math.isfinite(std) or std <= 0 or not math.isfinite(x):
         return number(x, 4)
     decimals = 1 - math.floor(math.log10(std))
@@ -71,6 +73,19 @@ def percent(share: float | None) -> str:
         return "< 0.1 %"
     decimals = 0 if 0.1 <= abs(share) < 0.99 or share in (0.0, 1.0) else 1
     return f"{100 * share:.{decimals}f} %".replace("-", "−")
+
+
+def ratio(part: float | None, whole: float | None) -> str:
+    """part as a share of whole, in whole per cent."""
+    return "–" if part is None or not whole else f"{100 * part / whole:.0f} %"
+
+
+def evidence(x: float | None) -> str:
+    """A difference of BIC: one decimal where it decides, thousands set apart where it doesn't."""
+    if x is None or not math.isfinite(x):
+        return "–"
+    shown = f"{x:.1f}" if abs(x) < 100 else f"{x:,.0f}".replace(",", "\u202f")
+    return shown.replace("-", "−")
 
 
 def motion_unit(torque_unit: str) -> str:
