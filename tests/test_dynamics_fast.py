@@ -54,17 +54,17 @@ def case(request) -> tuple[mujoco.MjModel, Robot]:
     return model, robot_from_model(model)
 
 
-def motion(n: int, size: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def motion(n: int, size: int, seed: int = 0) -> tuple[jax.Array, jax.Array, jax.Array]:
     rng = np.random.default_rng(seed)
     q, qd, qdd = rng.uniform(-2.5, 2.5, (3, size, n))
-    return q, qd, qdd * 4.0
+    return jnp.asarray(q), jnp.asarray(qd), jnp.asarray(qdd * 4.0)
 
 
-def mujoco_torque(model: mujoco.MjModel, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+def mujoco_torque(model: mujoco.MjModel, q: jax.Array, qd: jax.Array, qdd: jax.Array) -> np.ndarray:
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     data = mujoco.MjData(model)
     torques = []
-    for data.qpos[:], data.qvel[:], data.qacc[:] in zip(q, qd, qdd, strict=True):
+    for data.qpos[:], data.qvel[:], data.qacc[:] in zip(np.asarray(q), np.asarray(qd), np.asarray(qdd), strict=True):
         mujoco.mj_inverse(model, data)
         torques.append(data.qfrc_inverse.copy())
     return np.array(torques)
@@ -77,7 +77,7 @@ def assert_close(ours, theirs, tolerance: float = ROUND_OFF) -> None:
 def test_inverse_dynamics_agrees_with_mujoco(case):
     model, robot = case
     q, qd, qdd = motion(robot.n, 20)
-    ours = [dynamics.inverse_dynamics(robot, *x) for x in zip(q, qd, qdd, strict=True)]
+    ours = jnp.stack([dynamics.inverse_dynamics(robot, *x) for x in zip(q, qd, qdd, strict=True)])
     assert_close(ours, mujoco_torque(model, q, qd, qdd))
 
 
@@ -131,20 +131,25 @@ def arm() -> Robot:
 def test_the_gram_matrix_is_that_of_the_weighted_regressor():
     robot = arm()
     q, qd, qdd = motion(6, 2345)
-    tau, weight = np.random.default_rng(1).uniform(0.5, 2.0, (2, 2345, 6))
+    tau, weight = jnp.asarray(np.random.default_rng(1).uniform(0.5, 2.0, (2, 2345, 6)))
     W = np.concatenate([dynamics.regressor_batch(robot, q, qd, qdd), tau[:, :, None]], axis=2) * weight[:, :, None]
     W = W.reshape(-1, 61)
     assert_close(dynamics.regressor_gram(robot, q, qd, qdd, tau, weight), W.T @ W)
 
 
+def compiled() -> tuple[int, int]:
+    """Programs compiled so far to run over chunks."""
+    return chunks._loop._cache_size(), chunks._sum_loop._cache_size()  # pyright: ignore
+
+
 def test_a_new_recording_length_compiles_nothing():
     robot = arm()
-    compiled = lambda: (chunks._loop._cache_size(), chunks._sum_loop._cache_size())  # noqa: E731
     run = lambda size: (  # noqa: E731
         dynamics.inverse_dynamics_batch(robot, *motion(6, size)),
         dynamics.regressor_gram(robot, *motion(6, size), motion(6, size)[0]),
     )
-    run(999), run(1001)
+    run(999)
+    run(1001)
     before = compiled()
     for size in (1, 17, 1000, 1777, 20_000, 20_001):
         assert run(size)[0].shape == (size, 6)
@@ -155,9 +160,9 @@ def test_a_refitted_robot_compiles_nothing():
     robot = arm()
     q, qd, qdd = motion(6, 10)
     nominal = dynamics.inverse_dynamics_batch(robot, q, qd, qdd)
-    before = chunks._loop._cache_size()
+    before = compiled()
     heavier = dynamics.inverse_dynamics_batch(with_phi(robot, 1.1 * robot.phi), q, qd, qdd)
-    assert chunks._loop._cache_size() == before
+    assert compiled() == before
     assert not np.allclose(heavier, nominal)
 
 
@@ -170,7 +175,7 @@ def test_a_batch_inside_a_trace_equals_one_outside():
 
 def test_not_a_number_stays_in_its_sample():
     q, qd, qdd = motion(6, 5)
-    q[0, 0] = np.nan
+    q = q.at[0, 0].set(jnp.nan)
     tau = np.asarray(dynamics.inverse_dynamics_batch(arm(), q, qd, qdd))
     assert np.isnan(tau[0]).any()
     assert np.isfinite(tau[1:]).all()

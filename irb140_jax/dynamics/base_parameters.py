@@ -53,7 +53,7 @@ def base_parameters(robot: Robot, samples: int = 50, *, key: Array | None = None
     key = jax.random.key(0) if key is None else key
     q, qd, qdd = jax.random.uniform(key, (3, max(samples, FEWEST), n), minval=-3.0, maxval=3.0)
     Y = np.asarray(regressor_batch(robot, q, qd, qdd)).reshape(-1, 10 * n)
-    R, pivots = scipy.linalg.qr(Y, mode="r", pivoting=True)
+    R, pivots = (np.asarray(x) for x in scipy.linalg.qr(Y, mode="r", pivoting=True))
     diagonal = np.abs(np.diag(R))
     rank = int(np.sum(diagonal > RANK_TOLERANCE * diagonal[0]))
     grouping = np.zeros((rank, 10 * n))

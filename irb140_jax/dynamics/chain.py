@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from irb140_jax.dynamics.regroup import regrouping
@@ -65,7 +66,7 @@ def plan(robot: Robot, regrouped: bool = True) -> Plan:
     Inertial parameters count as unknown, so that a refitted robot does not make XLA compile again.
     """
     geometry = (robot.rotation, robot.position, robot.axis, robot.reference, robot.gravity)
-    if any(isinstance(x, jax.core.Tracer) for x in geometry):
+    if any(isinstance(x, Tracer) for x in geometry):
         return Plan((None,) * (26 * robot.n + 3), None, robot.is_slide)
     key = (*map(id, geometry), robot.is_slide, regrouped)
     if key not in _plans:

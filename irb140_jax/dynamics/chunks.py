@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 # Samples at a time: the intermediate results of so many stay in the second-level cache.
@@ -50,13 +51,14 @@ def sum_of_chunks(kernel: Kernel, given: Any, samples: tuple[Float[Array, "T ...
     if is_traced(given, samples):
         return _traced_sum(kernel, given, samples)
     arrays = [np.asarray(x, float) for x in samples]
-    pieces = [_piece_sum(kernel, given, [x[k : k + SEGMENT] for x in arrays]) for k in range(0, len(arrays[0]), SEGMENT)]
+    starts = range(0, max(len(arrays[0]), 1), SEGMENT)
+    pieces = [_piece_sum(kernel, given, [x[k : k + SEGMENT] for x in arrays]) for k in starts]
     return sum(pieces[1:], pieces[0])
 
 
 def is_traced(*trees: Any) -> bool:
     """Whether any array in there is a tracer: then its size is all that can be known."""
-    return any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(trees))
+    return any(isinstance(x, Tracer) for x in jax.tree.leaves(trees))
 
 
 def _piece(kernel: Kernel, given: Any, arrays: list[np.ndarray]) -> np.ndarray:

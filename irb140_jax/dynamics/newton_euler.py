@@ -163,6 +163,6 @@ def rigid_torque(
 ) -> Float[Array, "n *T"]:
     """Torques of the rigid bodies alone, shape (n,) for one sample, (n, T) for a batch; qdd = 0 if it is None."""
     predicate = always(q, qd)
-    accelerations = [0.0] * len(arm.links) if qdd is None else list(qdd)
+    accelerations: list[Number] = [0.0] * len(arm.links) if qdd is None else list(qdd)
     torques = inward(*outward(arm, list(q), list(qd), accelerations, predicate), predicate)
     return jnp.stack([jnp.broadcast_to(jnp.asarray(x, q.dtype), q.shape[1:]) for x in torques])
