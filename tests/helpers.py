@@ -33,21 +33,22 @@ def random_robot_xml(seed: int, n: int, slides: bool = True, *, kinds: str | Non
     """
     rng = np.random.default_rng(seed)
     kinds = kinds or "".join("S" if slides and rng.random() < 0.3 else "H" for _ in range(n))
-    body = f'<body name="tip" pos="{_vector(rng)}" quat="{_vector(rng, 4)}">{_inertial(rng)}<site name="tool" pos="{_vector(rng)}" quat="{_vector(rng, 4)}"/></body>'  # noqa: E501
+    body = _body(rng, f'<site name="tool" {_pose(rng)}/>')
     joints = ""
     for i in reversed(range(n)):
         joints = _joint(rng, i, kinds[i]) + joints
         if i and rng.random() < 0.2:
             continue  # the next joint goes onto the same body
-        welded = f'<body pos="{_vector(rng)}" quat="{_vector(rng, 4)}">{_inertial(rng)}</body>' if rng.random() < 0.4 else ""
-        body = f'<body pos="{_vector(rng)}" quat="{_vector(rng, 4)}">{_inertial(rng)}{joints}{welded}{body}</body>'
+        welded = _body(rng, "") if rng.random() < 0.4 else ""
+        body = _body(rng, joints + welded + body)
         joints = ""
         if i and rng.random() < 0.2:  # a mount between two links
-            body = f'<body pos="{_vector(rng)}" quat="{_vector(rng, 4)}">{_inertial(rng)}{body}</body>'
-    motors = "".join(f'<motor joint="joint{i + 1}" gear="{rng.uniform(1, 50):.9g}" ctrlrange="-1 1"/>' for i in range(n))
+            body = _body(rng, body)
+    gears = rng.uniform(1, 50, n)
+    motors = "".join(f'<motor joint="joint{i + 1}" gear="{gears[i]:.9g}" ctrlrange="-1 1"/>' for i in range(n))
     return f"""<mujoco model="random"><compiler autolimits="true" angle="radian"/>
     <option gravity="{_vector(rng, scale=9.81)}"/>
-    <worldbody><body name="mount" pos="{_vector(rng)}" quat="{_vector(rng, 4)}">{_inertial(rng)}{body}</body></worldbody>
+    <worldbody>{_body(rng, body)}</worldbody>
     <actuator>{motors}</actuator></mujoco>"""
 
 
@@ -83,11 +84,19 @@ def _vector(rng: np.random.Generator, size: int = 3, scale: float = 0.3) -> str:
     return " ".join(f"{x:.9g}" for x in scale * rng.normal(size=size))
 
 
+def _pose(rng: np.random.Generator) -> str:
+    return f'pos="{_vector(rng)}" quat="{_vector(rng, 4)}"'
+
+
+def _body(rng: np.random.Generator, content: str) -> str:
+    return f"<body {_pose(rng)}>{_inertial(rng)}{content}</body>"
+
+
 def _inertial(rng: np.random.Generator) -> str:
     moments = rng.uniform(0.01, 0.2, 3) @ (1 - np.eye(3))  # sums of two second moments: always possible for a body
     diagonal = " ".join(f"{x:.9g}" for x in moments)
     mass = f"{rng.uniform(0.2, 5):.9g}"
-    return f'<inertial pos="{_vector(rng)}" quat="{_vector(rng, 4)}" mass="{mass}" diaginertia="{diagonal}"/>'
+    return f'<inertial {_pose(rng)} mass="{mass}" diaginertia="{diagonal}"/>'
 
 
 def _joint(rng: np.random.Generator, i: int, kind: str) -> str:
@@ -95,7 +104,7 @@ def _joint(rng: np.random.Generator, i: int, kind: str) -> str:
     low, high, ref, rest = rng.uniform(-3, -1), rng.uniform(1, 3), rng.normal(), rng.normal()
     armature, damping, dry, stiffness = rng.uniform(0, 1, 4) * (0.5, 2.0, 1.0, 5.0)
     return (
-        f'<joint name="joint{i + 1}" type="{kind}" axis="{_vector(rng)}" pos="{_vector(rng)}" range="{low:.9g} {high:.9g}" '
-        f'ref="{ref:.9g}" springref="{rest:.9g}" armature="{armature:.9g}" damping="{damping:.9g}" '
-        f'frictionloss="{dry:.9g}" stiffness="{stiffness:.9g}"/>'
+        f'<joint name="joint{i + 1}" type="{kind}" axis="{_vector(rng)}" pos="{_vector(rng)}" '
+        f'range="{low:.9g} {high:.9g}" ref="{ref:.9g}" springref="{rest:.9g}" armature="{armature:.9g}" '
+        f'damping="{damping:.9g}" frictionloss="{dry:.9g}" stiffness="{stiffness:.9g}"/>'
     )

@@ -227,8 +227,8 @@ def test_jit_changes_nothing():
     robot, _ = random_robot("SHS", 4)
     q, qd, _ = state_of(robot, 4)
     with jax.disable_jit():
-        eager = dynamics.mass_matrix(robot, q), dynamics.coriolis_matrix(robot, q, qd), dynamics.gravity_torque(robot, q)
-    assert all(close(a, b, 1e-14) for a, b in zip(eager, equations(robot, q, qd)[:3], strict=True))
+        eager = dynamics.mass_matrix(robot, q), dynamics.coriolis_matrix(robot, q, qd)
+    assert all(close(a, b, 1e-14) for a, b in zip(eager, equations(robot, q, qd)[:2], strict=True))
 
 
 def test_vmap_is_the_loop():

@@ -7,10 +7,14 @@ resolved, so they are left out.  What a URDF means by leaving something out is k
 import xml.etree.ElementTree as ET
 from typing import NamedTuple
 
+import numpy as np
+
 from irb140_jax.errors import RobotError
 
 # MuJoCo compiles no moving body without mass or inertia; it gets this instead [kg, kg m^2], below any torque seen.
 NEGLIGIBLE = 1e-12
+
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 KNOWN_TYPES = ("revolute", "continuous", "prismatic", "fixed")
 
@@ -53,6 +57,8 @@ def prepared_urdf(robot: ET.Element, source: str) -> PreparedURDF:
         links.add("world")
     for joint in robot.findall("joint"):
         bare.append(_bare_joint(joint, links, source))
+    for link in bare.findall("link"):
+        _refuse_impossible_mass(link, source)
     effort, velocity = (_limits(robot, key, source) for key in ("effort", "velocity"))
     return PreparedURDF(ET.tostring(bare, encoding="unicode"), effort, velocity, _notes(robot))
 
@@ -95,6 +101,29 @@ def _bare_joint(joint: ET.Element, links: set[str], source: str) -> ET.Element:
     if kind != "fixed" and joint.find("axis") is None:
         ET.SubElement(kept, "axis", {"xyz": "1 0 0"})  # the default that URDF defines
     return kept
+
+
+def _refuse_impossible_mass(link: ET.Element, source: str) -> None:
+    """Negative values have to be caught here, before `NEGLIGIBLE` takes their place."""
+    mass = _numbers(link.find("inertial/mass"), ("value",), link, source)[0]
+    xx, xy, xz, yy, yz, zz = _numbers(link.find("inertial/inertia"), _INERTIA, link, source)
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    # Files are printed to a few digits, which may turn a moment of zero slightly negative.
+    if mass < 0.0 or moments[0] < -1e-6 * max(moments[2], NEGLIGIBLE):
+        what = f"mass {mass:g} kg and principal moments of inertia {moments} kg m^2"
+        raise RobotError(f"{source}: link '{link.get('name')}' has {what}; none may be negative: mend its <inertial>")
+
+
+def _numbers(element: ET.Element | None, keys: tuple[str, ...], link: ET.Element, source: str) -> list[float]:
+    """Attributes as numbers, 0 for what is not given."""
+    texts = ["0" if element is None else element.get(key, "0") for key in keys]
+    try:
+        numbers = [float(text) for text in texts]
+        if not np.all(np.isfinite(numbers)):
+            raise ValueError(f"not finite: {' '.join(texts)}")
+        return numbers
+    except ValueError as error:
+        raise RobotError(f"{source}: link '{link.get('name')}': {error}: give numbers in its <inertial>") from error
 
 
 def _limits(robot: ET.Element, key: str, source: str) -> dict[str, float]:
