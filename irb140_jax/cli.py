@@ -268,8 +268,21 @@ def _progress() -> Iterator[Callable[[str], None]]:
     from rich.console import Console
 
     console = Console(stderr=True, highlight=False)
-    if not console.is_terminal:
-        yield lambda sentence: print(sentence, file=sys.stderr, flush=True)
+    if console.is_terminal:
+        with console.status("") as status:
+            yield lambda sentence: status.update(sentence)
         return
-    with console.status("") as status:
-        yield lambda sentence: status.update(sentence)
+    held: list[str] = []
+
+    def tell(sentence: str) -> None:
+        # The first sentence waits for the second: input that can't be used is refused in the first step, and then
+        # stderr holds nothing but the line that says why.
+        held.append(sentence)
+        if len(held) == 2:
+            print(held[0], file=sys.stderr, flush=True)
+        if len(held) >= 2:
+            print(sentence, file=sys.stderr, flush=True)
+
+    yield tell
+    if len(held) == 1:
+        print(held[0], file=sys.stderr, flush=True)

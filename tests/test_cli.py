@@ -294,3 +294,26 @@ def test_demo_shows_the_seal_then_diagnoses_files_then_reveals_the_truth(table, 
     assert json.loads((out / "truth.json").read_text())["effects"] == [hidden]
     assert "What was hidden, what was found" in (out / "report.html").read_text(encoding="utf-8")
     np.testing.assert_allclose(stub["recordings"][0].q, channels["q"], atol=1e-8)  # read back from the file
+
+
+def test_input_refused_during_the_first_step_leaves_one_line_too(recording, tmp_path, stub, monkeypatch, capsys):
+    def diagnose(robot, recordings, config, progress):
+        progress("smoothing")
+        raise InputError("wave.csv: too short")
+
+    monkeypatch.setattr(irb140_jax.mismatch, "diagnose", diagnose)
+    assert "too short" in refused(capsys, "diagnose", recording, "--out", tmp_path / "d")
+    assert not (tmp_path / "d").exists()
+
+
+def test_progress_is_told_in_plain_lines_where_stderr_is_no_terminal(recording, tmp_path, stub, monkeypatch, capsys):
+    quick = irb140_jax.mismatch.diagnose
+
+    def diagnose(robot, recordings, config, progress):
+        for sentence in ("first", "second", "third"):
+            progress(sentence)
+        return quick(robot, recordings, config, lambda _: None)
+
+    monkeypatch.setattr(irb140_jax.mismatch, "diagnose", diagnose)
+    assert cli.main(["diagnose", str(recording), "--out", str(tmp_path / "d")]) == 0
+    assert capsys.readouterr().err.splitlines() == ["first", "second", "third"]
