@@ -21,7 +21,7 @@ def oracle_model(source: str | pathlib.Path | mujoco.MjModel) -> mujoco.MjModel:
     Args:
         source: Path of an MJCF or URDF file, its text, or a compiled model.
     """
-    if isinstance(source, mujoco.MjModel):
+    if not isinstance(source, str | pathlib.Path):
         model = copy.copy(source)
     elif str(source).lstrip().startswith("<"):
         model = mujoco.MjModel.from_xml_string(str(source))
