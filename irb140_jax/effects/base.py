@@ -119,6 +119,11 @@ class AbstractEffect(abc.ABC):
         del robot, joints
         return np.full(max(max(v) for v in self.variants) + 1, -np.inf)
 
+    def highest(self, robot: Robot, joints: np.ndarray) -> np.ndarray:
+        """Largest admissible amplitude of each column; beyond it another cause is to be looked for."""
+        del robot, joints
+        return np.full(max(max(v) for v in self.variants) + 1, np.inf)
+
     @abc.abstractmethod
     def where(self, names: str, values: dict[str, float], units: dict[str, str]) -> str:
         """One sentence: at which positions, speeds, loads, times or frequencies it acts."""

@@ -5,6 +5,9 @@ import numpy as np
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
 
 
+LARGEST = 1.5  # torque constants are known better than that; a model's torque full of noise feigns larger gains
+
+
 class TorqueGain(AbstractEffect):
     """real torque = gain x logged torque, so the log holds (1/gain - 1) x real torque beyond the model."""
 
@@ -12,7 +15,7 @@ class TorqueGain(AbstractEffect):
     title = "wrong torque constant"
     equation = "(1/gain - 1) tau_model"
     source = "Gautier and Briot, Global identification of joint drive gains, JMR 6(2), 2014"
-    parameters = (Parameter("gain", "1", low=0.0),)
+    parameters = (Parameter("gain", "1", low=1 / 1.5, high=1.5),)
     variants = ((0,),)
     confused_with = {
         "payload": "a known payload, on and off",
@@ -31,7 +34,10 @@ class TorqueGain(AbstractEffect):
         return np.array([1.0 / values["gain"] - 1.0]), np.zeros(0)
 
     def lowest(self, robot, joints):
-        return np.full(1, -0.9)
+        return np.full(1, 1.0 / LARGEST - 1.0)
+
+    def highest(self, robot, joints):
+        return np.full(1, LARGEST - 1.0)
 
     def where(self, names, values, units):
         return f"{names}: in proportion to the joint's whole torque; the real torque is {values['gain']:.3g} x the logged"

@@ -80,7 +80,10 @@ def assemble(lib: Library, stretches: list[Stretch], factor: np.ndarray, uncerta
     scale = np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
     loose = LooseInertials()
     extra = [
-        Candidate(loose, (k,), np.zeros(0), lib.size + 10 * k + np.arange(10), tuple(range(10)), np.full(10, -np.inf))
+        Candidate(
+            loose, (k,), np.zeros(0), lib.size + 10 * k + np.arange(10), tuple(range(10)), np.full(10, -np.inf),
+            np.full(10, np.inf),
+        )
         for k in range(lib.robot.n)
     ]
     return Data(out, scale, (*lib.candidates, *extra), nuisances)
@@ -100,15 +103,17 @@ def problem(data: Data, noise: Noise) -> tuple[Problem, Grams]:
     ])  # fmt: skip
     width = max(len(c.columns) for c in data.candidates)
     lowest = np.full((len(data.candidates), width), -np.inf)
+    highest = np.full((len(data.candidates), width), np.inf)
     for i, c in enumerate(data.candidates):
         s = data.scale[data.nuisances + c.columns]
         lowest[i, : len(c.columns)] = c.lowest / np.where(s > 0, s, 1.0)
-    energy = np.zeros(g.rows.shape[1])
+        highest[i, : len(c.columns)] = c.highest / np.where(s > 0, s, 1.0)
+    energy = np.full(g.rows.shape[1], 1e-300)
     for r, s in enumerate(data.stretches):
         for j in range(len(energy)):
-            white = noise.whitened(s.nominal[:, j], j, r)
+            white = noise.whitened(s.tau[:, j], j, r)
             energy[j] += np.sum(white[Noise.usable(s.use[:, j])] ** 2)
-    return Problem(H, g.per_joint, energy, data.candidates, data.nuisances, log_prior, lowest), g
+    return Problem(H, g.per_joint, energy, data.candidates, data.nuisances, log_prior, lowest, highest), g
 
 
 def first_noise(data: Data) -> Noise:

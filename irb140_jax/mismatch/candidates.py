@@ -31,7 +31,7 @@ class Candidate:
         shape: Shape parameters, shape (s,).
         columns: Indices of the amplitudes used, among all amplitudes of the library.
         variant: Which of the effect's columns those are.
-        lowest: Smallest admissible amplitude of each.
+        lowest, highest: Admissible range of each.
     """
 
     effect: AbstractEffect
@@ -40,6 +40,7 @@ class Candidate:
     columns: np.ndarray
     variant: tuple[int, ...]
     lowest: np.ndarray
+    highest: np.ndarray
 
     @property
     def slug(self) -> str:
@@ -75,13 +76,13 @@ def library(robot: Robot, effects: Sequence[AbstractEffect], scales: Scales) -> 
         width = max(max(v) for v in effect.variants) + 1
         blocks.append((effect, sites, shapes, first))
         for s, joints in enumerate(sites):
-            lowest = effect.lowest(robot, joints)
+            low, high = effect.lowest(robot, joints), effect.highest(robot, joints)
             for g in range(shapes.shape[1]):
                 base = first + (s * shapes.shape[1] + g) * width
                 for variant in effect.variants:
                     v = np.array(variant)
                     candidates.append(
-                        Candidate(effect, tuple(map(int, joints)), shapes[s, g], base + v, variant, lowest[v])
+                        Candidate(effect, tuple(map(int, joints)), shapes[s, g], base + v, variant, low[v], high[v])
                     )
         first += len(sites) * shapes.shape[1] * width
     return Library(robot, tuple(candidates), tuple(blocks), first)

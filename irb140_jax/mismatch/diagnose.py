@@ -22,7 +22,7 @@ from irb140_jax.recordings.condition import choose_band, condition
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 
-FEWEST_ROWS = 100  # low-passed rows below which nothing can be said
+FEWEST_ROWS = 80  # low-passed rows below which nothing can be said
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,14 +75,14 @@ def diagnose(
     """
     config = config or DiagnoseConfig()
     progress("smoothing and differentiating the positions")
-    band = choose_band(list(recordings))
+    band = choose_band(list(recordings), robot)
     smooth = [condition(r, band) for r in recordings]
-    for r in smooth:
-        if len(band.kept(len(r.t))) < FEWEST_ROWS:
-            raise RecordingError(
-                f"{r.source}: {r.t[-1] - r.t[0]:.3g} s are left after the filter's ends are cut, too few to compare; "
-                "record at least 5 s of motion"
-            )
+    rows = [len(band.kept(len(r.t))) for r in smooth]
+    if sum(rows) < FEWEST_ROWS or min(rows) < FEWEST_ROWS // 5:
+        raise RecordingError(
+            f"{smooth[int(np.argmin(rows))].source}: {min(rows)} samples below {band.torque:.3g} Hz are left after "
+            f"conditioning, {sum(rows)} in all; that is too few to compare, record at least 15 s of motion"
+        )
     ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, progress)
     progress("proving on data that the fit did not see")
     ex = _gated(ex)

@@ -100,7 +100,7 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
         blocks.append((named.effect, np.array([named.joints]), named.shape[None, None, :], first))
         candidates.append(
             Candidate(named.effect, named.joints, named.shape, first + np.array(named.variant), named.variant,
-                      np.full(len(named.variant), -np.inf))
+                      np.full(len(named.variant), -np.inf), np.full(len(named.variant), np.inf))
         )  # fmt: skip
         first += width
     lib = Library(model.robot, tuple(candidates), tuple(blocks), first)

@@ -14,7 +14,7 @@ from irb140_jax.mismatch.evidence import Layout, eliminated, gain_of, gains, lay
 ACCEPT = np.log(100.0)  # posterior odds a finding needs; under the null, a bound of 1 % on a false one (Markov)
 PREFER = np.log(20.0)  # odds at which a law replaces the simpler one that it contains
 FORM_ERROR = 0.03  # no law is exact: 3 % of what a joint's effects explain is not evidence for another effect
-RIGID_ERROR = 0.0003  # the same for the rigid-body torque: geometry, timing
+LEAST_SHARE = 0.005  # an effect below this share of its joint's torque is within what smoothing and geometry feign
 MOST = 40  # effects at most in one set
 
 
@@ -25,20 +25,21 @@ class Problem:
     Attributes:
         H: Gram matrix over [nuisances | amplitudes | y], nuisances eliminated, shape (K + 1, K + 1).
         per_joint: Gram matrices of each joint's rows before elimination, shape (n, K + 1, K + 1).
-        rigid_energy: Squared whitened nominal torque of each joint, shape (n,).
+        torque_energy: Squared whitened logged torque of each joint, shape (n,).
         candidates: What may be in the set.
         offset: Column of the first amplitude.
         log_prior: Log prior odds of each candidate, shape (len(candidates),).
-        lowest: Smallest admissible amplitudes in prior units, per candidate, padded with -inf.
+        lowest, highest: Admissible amplitudes in prior units, per candidate, padded with -inf and inf.
     """
 
     H: np.ndarray
     per_joint: np.ndarray
-    rigid_energy: np.ndarray
+    torque_energy: np.ndarray
     candidates: tuple[Candidate, ...]
     offset: int
     log_prior: np.ndarray
     lowest: np.ndarray
+    highest: np.ndarray
 
     def columns(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Columns of H that a set uses."""
@@ -75,8 +76,18 @@ class Problem:
             groups = [Layout(g.which[near[g.which]], g.columns[near[g.which]]) for g in groups if near[g.which].any()]
         gain, mean = gains(H, groups, len(self.candidates), self.lowest.shape[1])
         with np.errstate(invalid="ignore"):
-            bad = np.any(mean < self.lowest - 1e-9, axis=1)
-        return np.where(bad, -np.inf, gain + self.log_prior)
+            bad = np.any((mean < self.lowest - 1e-9) | (mean > self.highest + 1e-9), axis=1)
+        return np.where(bad | (self._share(groups, mean) < LEAST_SHARE), -np.inf, gain + self.log_prior)
+
+    def _share(self, groups: Collection[Layout], mean: np.ndarray) -> np.ndarray:
+        """Torque of each candidate with these amplitudes, as a share of the torque of the joint it matters most to."""
+        share = np.zeros(len(self.candidates))
+        for g in groups:
+            k = g.columns.shape[1]
+            G = self.per_joint[:, g.columns[:, :, None], g.columns[:, None, :]]
+            energy = np.einsum("ik,jikl,il->ji", mean[g.which, :k], G, mean[g.which, :k])
+            share[g.which] = np.sqrt(np.max(energy / self.torque_energy[:, None], axis=0))
+        return share
 
     def odds(self, H: np.ndarray, chosen: Iterable[int]) -> float:
         """Log posterior odds of a set against the empty one, given what H has eliminated."""
@@ -91,10 +102,10 @@ class Problem:
         """Log odds that imperfect laws could feign at each joint, shape (n,)."""
         index = self.columns(chosen)
         if len(index) == 0:
-            return 0.5 * RIGID_ERROR**2 * self.rigid_energy
+            return np.zeros(len(self.per_joint))
         v = posterior(self.H, index).mean
         explained = np.einsum("i,jik,k->j", v, self.per_joint[:, index[:, None], index[None, :]], v)
-        return 0.5 * FORM_ERROR**2 * explained + 0.5 * RIGID_ERROR**2 * self.rigid_energy
+        return 0.5 * FORM_ERROR**2 * explained
 
 
 def search(problem: Problem, start: tuple[int, ...] = ()) -> tuple[int, ...]:
@@ -104,26 +115,43 @@ def search(problem: Problem, start: tuple[int, ...] = ()) -> tuple[int, ...]:
     joints it touched, and at the end among all, until nothing improves.
     """
     chosen = _settled(problem, start)
-    for _ in range(2):
-        grown = _grown(problem, chosen)
-        settled = _settled(problem, grown)
-        if settled == chosen:
+    for _ in range(3):
+        settled = _split(problem, _settled(problem, _grown(problem, chosen)))
+        if set(settled) == set(chosen):
             break
         chosen = settled
     return chosen
 
 
-def _grown(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
+def _split(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    """Put several effects in the place of one that acts on several joints at once, where they explain more."""
+    for d in chosen:
+        joints = problem.candidates[d].joints
+        if len(joints) < 2:
+            continue
+        banned = frozenset(i for i, c in enumerate(problem.candidates) if len(c.joints) > 1 and set(c.joints) & set(joints))
+        rest = tuple(c for c in chosen if c != d)
+        other = _settled(problem, _grown(problem, rest, banned), set(joints), banned)
+        H = problem.without(tuple(set(rest) & set(other)))
+        new, old = (tuple(c for c in s if c not in set(rest) & set(other)) for s in (other, chosen))
+        if problem.odds(H, new) - len(new) * ACCEPT > problem.odds(H, old) - len(old) * ACCEPT:
+            return other
+    return chosen
+
+
+def _grown(
+    problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = frozenset()
+) -> tuple[int, ...]:
     """Add the best candidate, settle around it, and again, until none is worth adding."""
     seen: set[frozenset[int]] = set()
     while len(chosen) < MOST:
         scores = problem.scores(problem.without(chosen)) - _hurdle(problem, chosen) - ACCEPT
-        scores[list(chosen)] = -np.inf
+        scores[[*chosen, *banned]] = -np.inf
         scores = np.where(_conflicts(problem, chosen), -np.inf, scores)
         best = int(np.argmax(scores))
         if scores[best] <= 0:
             break
-        chosen = _settled(problem, (*chosen, best), set(problem.candidates[best].joints))
+        chosen = _settled(problem, (*chosen, best), set(problem.candidates[best].joints), banned)
         if frozenset(chosen) in seen:
             break  # adding and settling undo each other
         seen.add(frozenset(chosen))
@@ -148,18 +176,22 @@ def _conflicts(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
     ])  # fmt: skip
 
 
-def _settled(problem: Problem, chosen: tuple[int, ...], joints: set[int] | None = None) -> tuple[int, ...]:
+def _settled(
+    problem: Problem, chosen: tuple[int, ...], joints: set[int] | None = None, banned: frozenset[int] = frozenset()
+) -> tuple[int, ...]:
     """Exchange, simplify and remove until nothing improves, among the members at some joints or all."""
     for _ in range(30):
         near = tuple(c for c in chosen if joints is None or joints & set(problem.candidates[c].joints))
-        changed = _exchange(problem, chosen, near) or _simplify(problem, chosen, near) or _remove(problem, chosen, near)
+        changed = _exchange(problem, chosen, near, banned) or _simplify(problem, chosen, near) or _remove(problem, chosen, near)
         if changed is None:
             return chosen
         chosen = changed
     return chosen
 
 
-def _exchange(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) -> tuple[int, ...] | None:
+def _exchange(
+    problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...], banned: frozenset[int]
+) -> tuple[int, ...] | None:
     """The best replacement of one or two members by one candidate that shares a joint with them."""
     hurdle = _hurdle(problem, chosen)
     best, best_move = 1e-6, None
@@ -171,7 +203,7 @@ def _exchange(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) 
         H = problem.without(rest)
         scores = problem.scores(H, {j for c in old for j in c.joints}) - problem.odds(H, drop)
         scores[_conflicts(problem, rest)] = -np.inf
-        scores[list(drop)] = -np.inf
+        scores[[*drop, *banned]] = -np.inf
         for i in np.flatnonzero(scores > best):
             c = problem.candidates[i]
             if len(drop) == 1 and c.slug in old[0].effect.contains:
@@ -213,7 +245,10 @@ def _remove(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) ->
     odds = {}
     for d in near:
         rest = tuple(x for x in chosen if x != d)
-        odds[d] = problem.odds(problem.without(rest), (d,)) - _hurdle(problem, rest)[d]
+        H = problem.without(rest)
+        # The score knows what is admissible: what was so when it entered need not be so beside later members.
+        fits = np.isfinite(problem.scores(H, problem.candidates[d].joints)[d])
+        odds[d] = problem.odds(H, (d,)) - _hurdle(problem, rest)[d] if fits else -np.inf
     if not odds or min(odds.values()) >= ACCEPT:
         return None
     weakest = min(odds, key=lambda d: odds[d])

@@ -10,11 +10,15 @@ import warnings
 import numpy as np
 from scipy import interpolate, ndimage, signal
 
+from irb140_jax import dynamics
 from irb140_jax.recordings.recording import Recording
+from irb140_jax.robot import Robot
 
 MAX_TORQUE_BAND = 20.0  # Hz; above this, arms are not rigid and motor torque holds mostly current ripple
 MIN_TORQUE_BAND = 4.0  # Hz; friction reversals are steps, a narrower band would blur them into the inertia
 WORKING_RATE = 200.0  # Hz; columns are evaluated at least this often
+SLOW = 3.0  # Hz; below, model and log may differ by the very friction that is looked for
+INCOHERENT = 0.05  # share of the model's torque that may be noise: what biases parameters by as much
 KAISER_BETA = 6.0  # about 63 dB in the stop band: below the noise of any torque log
 
 
@@ -86,8 +90,13 @@ class Conditioned:
     notes: tuple[str, ...]
 
 
-def choose_band(recordings: list[Recording]) -> Band:
-    """The band in which the positions carry motion rather than noise, the same for all recordings."""
+def choose_band(recordings: list[Recording], robot: Robot) -> Band:
+    """The band in which positions carry motion, and the model's torque means something, in all recordings alike.
+
+    Two limits: the positions' spectrum must stand above their noise, and differentiated positions must not fill the
+    model's torque with what the logged torque knows nothing of (noise, play, flexibility), for regressors that hold
+    noise bias every parameter towards zero.
+    """
     top, rates = [], []
     for recording in recordings:
         t, q, _, _ = _even(recording)
@@ -95,13 +104,61 @@ def choose_band(recordings: list[Recording]) -> Band:
         rates.append(rate)
         top.append([_signal_limit(q[:, j], rate) for j in range(q.shape[1])])
     # The fastest recording decides; within it, the middling joint: a still joint says nothing, a noisy one too much.
-    limit = float(np.max(np.nanmedian(np.where(np.array(top) > 0, top, np.nan), axis=1), initial=0.0))
+    limit = max((float(np.median([f for f in row if f > 0] or [0.0])) for row in top), default=0.0)
     slowest = float(min(rates))
-    torque = float(np.clip(2.0 * limit, MIN_TORQUE_BAND, min(MAX_TORQUE_BAND, slowest / 6.0)))
-    position = min(1.6 * torque, 0.4 * slowest)
-    rate = max(WORKING_RATE, 8.0 * torque)
-    rate = min(rate, slowest)
-    return Band(torque, position, rate, max(1, int(rate / (2.2 * torque))))
+    highest = max(min(MAX_TORQUE_BAND, slowest / 6.0), 1.0)
+    band = _band(float(np.clip(2.0 * limit, min(MIN_TORQUE_BAND, highest), highest)), slowest)
+    coherent = _coherent_limit([condition(r, band) for r in recordings], robot, band)
+    return _band(max(min(band.torque, coherent), min(MIN_TORQUE_BAND, highest)), slowest)
+
+
+def _band(torque: float, rate: float) -> Band:
+    """The band with this torque cut-off for recordings of this rate."""
+    working = min(max(WORKING_RATE, 8.0 * torque), rate)
+    return Band(torque, min(1.6 * torque, 0.4 * rate), working, max(1, int(working / (2.2 * torque))))
+
+
+def _coherent_limit(smooth: list["Conditioned"], robot: Robot, band: Band) -> float:
+    """Highest frequency [Hz] up to which the model's torque is not filled with what the log and friction don't show.
+
+    Of the model's torque m, the part incoherent with the logged torque and the direction of motion is summed from
+    `SLOW` upwards; it must stay below `INCOHERENT` of the whole power, for every joint.  What friction a regression
+    below `SLOW` finds is taken off the logged torque first: where friction rules, m and the log would not match at all.
+    """
+    window = int(band.rate)  # one second: resolves 1 Hz
+    f = np.fft.rfftfreq(window, 1.0 / band.rate)
+    spectra = np.zeros((robot.n, len(f), 4, 4), dtype=complex)
+    taper = np.hanning(window)[:, None]
+    phi = np.asarray(robot.phi).ravel()
+    for r in smooth:
+        Y = np.asarray(dynamics.regressor_batch(robot, r.q, r.qd, r.qdd))
+        m = Y @ phi + np.asarray(robot.armature) * r.qdd
+        direction = np.tanh(r.qd / r.rest_speed)
+        friction = np.concatenate([direction, r.qd], axis=1)
+        slow = _filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), _kernels(SLOW, band.rate)[0], odd=False)
+        for j in range(robot.n):
+            inputs = np.concatenate([slow[:, [robot.n + j, 2 * robot.n + j]], slow[:, 3 * robot.n :]], axis=1)
+            inputs = np.concatenate([inputs, np.ones((len(inputs), 1))], axis=1)
+            w = np.linalg.lstsq(inputs, slow[:, j], rcond=1e-6)[0]
+            x = np.stack([m[:, j], r.tau[:, j] - friction @ w[2:-1], direction[:, j], r.tau[:, j]], axis=1)
+            for start in range(0, len(x) - window + 1, window // 2):
+                piece = x[start : start + window]
+                F = np.fft.rfft((piece - piece.mean(axis=0)) * taper, axis=0)
+                spectra[j] += np.einsum("fa,fb->fab", F.conj(), F)
+    limit = band.torque
+    for s in spectra[:, 1:]:
+        power, inputs, cross = s[:, 0, 0].real, s[:, 1:3, 1:3], s[:, 1:3, 0]
+        if power.sum() <= 0:
+            continue
+        ridge = 1e-9 * np.trace(inputs, axis1=1, axis2=2).real[:, None, None] + 1e-300
+        known = np.einsum("fa,fa->f", cross.conj(), np.linalg.solve(inputs + ridge * np.eye(2), cross[..., None])[..., 0])
+        unknown = np.where(f[1:] > SLOW, np.clip(power - known.real, 0.0, None), 0.0)
+        # Noise in a model torque that is small beside the logged one does no harm.
+        share = np.cumsum(unknown) / np.maximum(np.cumsum(power), np.cumsum(s[:, 3, 3].real))
+        over = np.flatnonzero(share > INCOHERENT)
+        if len(over):
+            limit = min(limit, float(f[1:][over[0]]))
+    return limit
 
 
 def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditioned:
