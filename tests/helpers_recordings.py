@@ -67,12 +67,12 @@ def recording(
     duration: float = 8.0, rate: float = 250.0, arm: mujoco.MjModel | None = None, **kind: bool,
 ) -> Recording:
     """A sound recording: rigid torque of `arm` plus viscous and dry friction and noise."""
-    arm = arm or model(**kind)
-    names = tuple(arm.joint(i).name for i in range(arm.njnt))
+    true = model(**kind) if arm is None else arm
+    names = tuple(true.joint(i).name for i in range(true.njnt))
     slide = kind.get("slide", False)
     t, q, qd, qdd = motion(len(names), seed=seed, size=size, duration=duration, rate=rate, slide=slide)
     rng = np.random.default_rng(seed + 1000)
-    tau = rigid_torque(arm, q, qd, qdd) + friction * (np.sign(qd) + 0.3 * qd) + noise * rng.normal(size=q.shape)
+    tau = rigid_torque(true, q, qd, qdd) + friction * (np.sign(qd) + 0.3 * qd) + noise * rng.normal(size=q.shape)
     q = q + 1e-5 * rng.normal(size=q.shape)
     return Recording(t=t, q=q, tau=tau, qd=qd if speeds else None, joint_names=names, source="made")
 

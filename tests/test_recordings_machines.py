@@ -20,8 +20,8 @@ def needs(machine):
     try:
         recordings_folder(machine)
     except RecordingError as error:
-        return pytest.mark.skip(reason=f"needs the published recordings: {error}")
-    return pytest.mark.usefixtures()
+        return pytest.mark.skipif(True, reason=str(error))
+    return pytest.mark.skipif(False, reason="")
 
 
 needs_tx40, needs_pendulum = needs("staubli_tx40"), needs("dfki_double_pendulum")
@@ -37,7 +37,8 @@ def rigid_error(robot, t, q, tau, position_cutoff, torque_cutoff, stride=1):
     q = low_pass(q, position_cutoff, step)
     qd = np.gradient(q, step, axis=0)
     qdd = np.gradient(qd, step, axis=0)
-    nominal = inverse_dynamics_batch(robot, *(jnp.asarray(x[::stride]) for x in (q, qd, qdd)))
+    q, qd, qdd = (jnp.asarray(x[::stride]) for x in (q, qd, qdd))
+    nominal = inverse_dynamics_batch(robot, q, qd, qdd)
     return np.asarray(nominal) - low_pass(tau, torque_cutoff, step)[::stride]
 
 
@@ -81,8 +82,8 @@ def pendulum_rmse(robot, runs):
     for path in runs:
         run = read_recording(path, robot)
         t = np.arange(run.t[0], run.t[-1], 0.002)
-        even = [np.stack([np.interp(t, run.t, x[:, j]) for j in range(2)], axis=1) for x in (run.q, run.tau)]
-        errors.append(rigid_error(robot, t, *even, 10.0, 10.0)[150:-150])
+        q, tau = (np.stack([np.interp(t, run.t, x[:, j]) for j in range(2)], axis=1) for x in (run.q, run.tau))
+        errors.append(rigid_error(robot, t, q, tau, 10.0, 10.0)[150:-150])
     return np.sqrt(np.mean(np.concatenate(errors) ** 2, axis=0))
 
 
