@@ -211,6 +211,22 @@ def test_urdf_that_is_no_serial_chain_is_refused(tmp_path, parts, says):
         read(tmp_path, urdf(**parts), "bench.urdf")
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [('name="b"', 'name="a"', "two joints"), ('name="lower"', 'name="upper"', "two links")],
+)
+def test_urdf_with_a_name_twice_is_refused(tmp_path, old, new, says):
+    with pytest.raises(RobotError, match=f"{says} have the name"):
+        read(tmp_path, urdf().replace(old, new), "bench.urdf")
+
+
+def test_warnings_of_mujoco_become_notes(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    robot = read(tmp_path, arm(extra='<size nuser_jnt="1"/>', first='name="a" user="nan"'))
+    assert robot.notes == ("MuJoCo warns: XML contains a 'NaN'. Please check it carefully.",)
+    assert capfd.readouterr() == ("", "") and not (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+
 def test_real_urdf_without_meshes_or_world_link_is_read():
     folder = recordings_folder()
     tx40 = load_robot(folder / "staubli_tx40" / "tx40_mdh_modified.urdf")
@@ -267,6 +283,9 @@ TENDON = '<tendon><fixed name="t"><joint joint="a" coef="1"/><joint joint="b" co
         ({"actuators": '<motor name="m" site="s"/>', "inside": '<site name="s"/>'}, "actuator 'm' drives no joint"),
         ({"extra": '<custom><numeric name="velocity_limit" data="2"/></custom>'}, "one for each of the 2 joints"),
         ({"extra": '<custom><numeric name="velocity_limit" data="2 0"/></custom>'}, "allowed: positive numbers"),
+        ({"first": 'name="a" armature="-1"'}, "joint 'a' has armature -1; allowed: 0 or more"),
+        ({"second": 'name="b" frictionloss="-0.1"'}, "joint 'b' has frictionloss -0.1"),
+        ({"first": 'name="a" damping="nan"'}, "damping is .*nan"),
         ({"first": 'name="b"'}, "MuJoCo can't compile this model: .*repeated name 'b'"),
         ({"extra": '<asset><mesh name="gone" file="gone.stl"/></asset>'}, "gone.stl"),
     ],

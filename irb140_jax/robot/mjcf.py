@@ -2,7 +2,7 @@
 
 import pathlib
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import jax.numpy as jnp
 import mujoco
@@ -11,7 +11,7 @@ import numpy as np
 from irb140_jax.errors import RobotError
 from irb140_jax.robot.drive import drives
 from irb140_jax.robot.links import link_frames_at_rest, link_inertials, tool_frame
-from irb140_jax.robot.refuse import refuse_unsupported
+from irb140_jax.robot.refuse import refuse_impossible_numbers, refuse_unsupported
 from irb140_jax.robot.robot import Robot
 from irb140_jax.robot.urdf import prepared_urdf
 
@@ -30,17 +30,12 @@ def load_robot(path: str | pathlib.Path) -> Robot:
     """
     path = pathlib.Path(path)
     root = _root(path)
-    try:
-        if root.tag == "robot":
-            urdf = prepared_urdf(root, str(path))
-            model = mujoco.MjModel.from_xml_string(urdf.text)
-            return robot_from_model(model, str(path), urdf.effort, urdf.velocity, urdf.notes)
-        return robot_from_model(mujoco.MjModel.from_xml_path(str(path)), str(path))
-    except RobotError:
-        raise
-    except (ValueError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split())
-        raise RobotError(f"{path}: MuJoCo can't compile this model: {reason}: mend the file there") from error
+    if root.tag == "robot":
+        urdf = prepared_urdf(root, str(path))
+        model, warned = _compiled(lambda: mujoco.MjModel.from_xml_string(urdf.text), path)
+        return robot_from_model(model, str(path), urdf.effort, urdf.velocity, (*urdf.notes, *warned))
+    model, warned = _compiled(lambda: mujoco.MjModel.from_xml_path(str(path)), path)
+    return robot_from_model(model, str(path), notes=warned)
 
 
 def robot_from_model(
@@ -84,6 +79,7 @@ def robot_from_model(
         velocity_limit=np.minimum(_velocity_limit(model, source), _by_name(velocity, names)),
         effort_limit=np.minimum(drive.effort, _by_name(effort, names)),
     )  # fmt: skip
+    refuse_impossible_numbers(fields, names, source)
     return Robot(
         **{key: jnp.array(value, dtype=float) for key, value in fields.items()},
         joint_names=names,
@@ -103,6 +99,21 @@ def _root(path: pathlib.Path) -> ET.Element:
     if root.tag not in ("mujoco", "robot"):
         raise RobotError(f"{path}: root element <{root.tag}>; allowed: <mujoco> (MJCF) or <robot> (URDF): convert it")
     return root
+
+
+def _compiled(
+    compile_model: Callable[[], mujoco.MjModel], path: pathlib.Path
+) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """The model, and MuJoCo's warnings as notes: by itself it would print them and leave a log file behind."""
+    warned: list[str] = []
+    mujoco.set_mju_user_warning(lambda text: warned.append(f"MuJoCo warns: {' '.join(text.split())}"))
+    try:
+        return compile_model(), tuple(warned)
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split())
+        raise RobotError(f"{path}: MuJoCo can't compile this model: {reason}: mend the file there") from error
+    finally:
+        mujoco.set_mju_user_warning(None)
 
 
 def _enabled(model: mujoco.MjModel, part: str) -> float:

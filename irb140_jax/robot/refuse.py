@@ -1,6 +1,6 @@
 """What a `Robot` can't represent is refused, by name and with what to do about it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import mujoco
 import numpy as np
@@ -8,6 +8,8 @@ import numpy as np
 from irb140_jax.errors import RobotError
 
 MOST_JOINTS = 10
+
+MAY_BE_INFINITE = ("lower", "upper", "velocity_limit", "effort_limit")
 
 
 def refuse_unsupported(model: mujoco.MjModel, source: str) -> None:
@@ -23,6 +25,27 @@ def refuse_unsupported(model: mujoco.MjModel, source: str) -> None:
     for check in (_joints, _chain, _couplings, _forces, _actuators):
         for problem in check(model):
             raise RobotError(f"{source}: {problem}")
+
+
+def refuse_impossible_numbers(fields: Mapping[str, np.ndarray], names: tuple[str, ...], source: str) -> None:
+    """Raise on NaN, and on friction or rotors of negative size: MuJoCo compiles files that hold them.
+
+    Args:
+        fields: Arrays of the robot to be, by the names of `Robot`'s fields.
+        names: Joint names.
+        source: Where they came from, for the message.
+
+    Raises:
+        RobotError: Names the field, and the joint where there is one.
+    """
+    for field, values in fields.items():
+        if np.any(np.isnan(values)) or (np.any(np.isinf(values)) and field not in MAY_BE_INFINITE):
+            shown = np.asarray(values).tolist()
+            raise RobotError(f"{source}: {field} is {shown}; allowed: numbers: mend the file there")
+    for field in ("armature", "damping", "frictionloss"):
+        for name, value in zip(names, fields[field], strict=True):
+            if value < 0.0:
+                raise RobotError(f"{source}: joint '{name}' has {field} {value:g}; allowed: 0 or more: mend it there")
 
 
 def parent_joint(model: mujoco.MjModel, body: int) -> int:

@@ -75,6 +75,11 @@ def _refuse(robot: ET.Element, source: str) -> None:
             raise RobotError(f"{source}: joint '{name}' is of type '{kind}'; known: {known}: fix it or remove it")
         if joint.find("mimic") is not None:
             raise RobotError(f"{source}: joint '{name}' mimics another one; known: independent joints: make it fixed")
+    for tag in ("link", "joint"):
+        names = [element.get("name", "") for element in robot.findall(tag)]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise RobotError(f"{source}: two {tag}s have the name '{twice}'; names are unique: rename one")
 
 
 def _compiler(robot: ET.Element) -> ET.Element:
