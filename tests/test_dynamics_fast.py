@@ -45,7 +45,7 @@ def random_chain(seed: int, n: int) -> mujoco.MjModel:
     )
 
 
-CASES = {"irb140": mujoco.MjModel.from_xml_path(str(ARM)), **{f"random{n}": random_chain(n, n) for n in (1, 5)}}
+CASES = {"irb140": mujoco.MjModel.from_xml_path(str(ARM)), **{f"random{n}": random_chain(n, n) for n in (1, 4)}}
 
 
 @pytest.fixture(params=list(CASES), scope="module")
@@ -81,9 +81,9 @@ def test_inverse_dynamics_agrees_with_mujoco(case):
     assert_close(ours, mujoco_torque(model, q, qd, qdd))
 
 
-def test_jit_and_vmap_of_a_traced_robot_change_nothing(case):
-    _, robot = case
-    q, qd, qdd = motion(robot.n, 20)
+def test_jit_and_vmap_of_a_traced_robot_change_nothing():
+    robot = robot_from_model(CASES["random4"])
+    q, qd, qdd = motion(4, 20)
     traced = jax.jit(jax.vmap(dynamics.inverse_dynamics, in_axes=(None, 0, 0, 0)))(robot, q, qd, qdd)
     assert_close(traced, dynamics.inverse_dynamics_batch(robot, q, qd, qdd))
 

@@ -1,13 +1,11 @@
 """Normal equations of a whole recording without its regressor in memory."""
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from irb140_jax.dynamics.chain import Plan, chain, plan
 from irb140_jax.dynamics.chunks import sum_of_chunks
 from irb140_jax.dynamics.regressor import regressor_blocks
-from irb140_jax.dynamics.scalars import is_known
 from irb140_jax.robot import Robot
 from irb140_jax.types import JointSamples
 
@@ -48,10 +46,6 @@ def _gram_of_chunk(given: tuple[Robot, Plan], q, qd, qdd, tau, weight) -> Float[
     blocks = regressor_blocks(chain(*given), q.T, qd.T, qdd.T)
     gram = jnp.zeros((10 * n + 1, 10 * n + 1), q.dtype)
     for j in range(n):
-        columns = {10 * i + k: x for i in range(j, n) for k, x in enumerate(blocks[j, i]) if not is_known(x, 0.0)}
-        columns[10 * n] = tau[:, j]
-        rows = jnp.stack([jnp.broadcast_to(jnp.asarray(x, q.dtype), tau.shape[:1]) for x in columns.values()])
-        rows = rows * weight[:, j]
-        at = np.array(list(columns))
-        gram = gram.at[at[:, None], at].add(rows @ rows.T)
+        rows = jnp.concatenate([*(block[j] for block in blocks[j:]), tau[None, :, j]]) * weight[None, :, j]
+        gram = gram.at[10 * j :, 10 * j :].add(rows @ rows.T)
     return gram

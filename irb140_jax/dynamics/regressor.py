@@ -1,5 +1,7 @@
 """The regressor: rigid-body torques are linear in the inertial parameters, tau = Y(q, qd, qdd) phi."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -7,12 +9,13 @@ from jaxtyping import Array, Float
 from irb140_jax.dynamics.chain import Chain, Plan, chain, plan
 from irb140_jax.dynamics.chunks import in_chunks
 from irb140_jax.dynamics.newton_euler import Motion, Placement, outward
-from irb140_jax.dynamics.scalars import ZERO, Number, Vector, add, cross, dot, minus, mul, plus
+from irb140_jax.dynamics.scalars import ZERO, Number, Vector, add, cross, dot, is_known, minus, mul, plus
 from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.robot import Robot
 from irb140_jax.types import Joints, JointSamples
 
-Blocks = dict[tuple[int, int], list[Number]]
+# Unit motions of joints: angular, and linear at a frame's origin.
+Screw = tuple[Vector, Vector]
 
 
 def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, "n 10*n"]:
@@ -42,43 +45,59 @@ def _regressor_of_chunk(given: tuple[Robot, Plan], q: JointSamples, qd: JointSam
 
 
 @jax.jit
-def _regressor(robot: Robot, ahead: Plan, q, qd, qdd):
-    blocks = regressor_blocks(chain(robot, ahead), q, qd, qdd)
-    none: list[Number] = [0.0] * 10
-    filled = lambda x: jnp.broadcast_to(jnp.asarray(x, q.dtype), q.shape[1:])  # noqa: E731
-    rows = [[filled(x) for i in range(robot.n) for x in blocks.get((j, i), none)] for j in range(robot.n)]
-    return jnp.stack([jnp.stack(row) for row in rows])
+def _regressor(
+    robot: Robot, ahead: Plan, q: Float[Array, "n *T"], qd: Float[Array, "n *T"], qdd: Float[Array, "n *T"]
+) -> Float[Array, "n 10*n *T"]:
+    columns = []
+    for i, block in enumerate(regressor_blocks(chain(robot, ahead), q, qd, qdd)):
+        missing = [(0, robot.n - i - 1)] + [(0, 0)] * (block.ndim - 1)
+        columns.append(jnp.pad(block, missing))  # (n, 10, *T)
+    return jnp.concatenate(columns, axis=1)
 
 
 def regressor_blocks(
     arm: Chain, q: Float[Array, "n *T"], qd: Float[Array, "n *T"], qdd: Float[Array, "n *T"]
-) -> Blocks:
-    """Ten scalars Y[j, i] for every joint j and every link i >= j that it carries; shapes (n,) or (n, T)."""
+) -> list[Float[Array, "j 10 *T"]]:
+    """For each link the regressor's columns of its ten parameters, rows of the joints up to the link's own only.
+
+    All joints are done at once, along the first axis; so that scalars of a sample meet it, they have an axis of one.
+    """
     predicate = always(q, qd)
-    places, motions = outward(arm, list(q), list(qd), list(qdd), predicate)
-    blocks: Blocks = {}
-    screws: list[tuple[Vector, Vector]] = []
+    scalars = lambda x: [x[i : i + 1] for i in range(len(arm.links))]  # noqa: E731
+    places, motions = outward(arm, scalars(q), scalars(qd), scalars(qdd), predicate)
+    screws: Screw = (ZERO, ZERO)
+    blocks = []
     for i, (place, motion) in enumerate(zip(places, motions, strict=True)):
-        screws = staged(predicate, lambda place=place, screws=screws: [_carried(place, x) for x in screws])
-        screws.append((ZERO, place.link.axis) if place.link.is_slide else (place.link.axis, ZERO))
-        rows = staged(predicate, lambda motion=motion, screws=screws: [_block(x, motion) for x in screws])
-        blocks |= {(j, i): row for j, row in enumerate(rows)}
+        screws = staged(predicate, partial(_next_screws, place, screws, q[:i]))
+        block = staged(predicate, partial(_block, screws, motion))
+        filled = [jnp.broadcast_to(jnp.asarray(x, q.dtype), (i + 1, *q.shape[1:])) for x in block]
+        blocks.append(jnp.stack(filled, axis=1))
     return blocks
 
 
-def _carried(place: Placement, screw: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
-    """A joint's unit motion (angular, linear at the origin), from the parent's frame to the link's."""
-    angular, linear = screw
-    return place.to_link(angular), place.to_link(plus(linear, cross(angular, place.position)))
+def _next_screws(place: Placement, screws: Screw, like: Float[Array, "j *T"]) -> Screw:
+    """Unit motions of all joints up to the link's own, seen from the link, out of those seen from its parent."""
+    angular, linear = screws
+    carried = place.to_link(angular), place.to_link(plus(linear, cross(angular, place.position)))
+    own = (ZERO, place.link.axis) if place.link.is_slide else (place.link.axis, ZERO)
+    return _joined(carried[0], own[0], like), _joined(carried[1], own[1], like)
 
 
-def _block(screw: tuple[Vector, Vector], motion: Motion) -> list[Number]:
-    """Power of a link's wrench (see `link_wrench`) on a joint's unit motion (u, v), per inertial parameter.
+def _joined(u: Vector, own: Vector, like: Float[Array, "j *T"]) -> Vector:
+    """The vectors of j joints and one more, shape (j + 1, *T)."""
+    filled = lambda x, rows: jnp.broadcast_to(jnp.asarray(x, like.dtype), (rows, *like.shape[1:]))  # noqa: E731
+    join = lambda x, y: jnp.concatenate([filled(x, like.shape[0]), filled(y, 1)])  # noqa: E731
+    x, y, z = (0.0 if is_known(a, 0.0) and is_known(b, 0.0) else join(a, b) for a, b in zip(u, own, strict=True))
+    return (x, y, z)
+
+
+def _block(screws: Screw, motion: Motion) -> list[Number]:
+    """Power of a link's wrench (see `link_wrench`) on the joints' unit motions (u, v), per inertial parameter.
 
     m: v.a;  h: alpha and w terms turned around, v x alpha + (v x w) x w + a x u;
     I: I_kl of u alpha^T + (u x w) w^T, made symmetric.
     """
-    u, v = screw
+    u, v = screws
     w, alpha, a = motion
     first = plus(minus(cross(v, alpha), cross(w, cross(v, w))), cross(a, u))
     uw = cross(u, w)

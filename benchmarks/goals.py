@@ -1,0 +1,47 @@
+"""What must be reached, and the table that says whether it was; computes nothing, needs nothing."""
+
+import math
+
+# name: (goal, "min" or "max"); ratios are against the peer in the same run.
+GOALS = {
+    "inverse_dynamics_1e3_ratio": (2.5, "min"),
+    "inverse_dynamics_1e5_ratio": (2.5, "min"),
+    "inverse_dynamics_1e3_compile_s": (2.0, "max"),
+    "inverse_dynamics_1e5_compile_s": (2.0, "max"),
+    "paper_style_ratio": (10.0, "min"),
+    "paper_style_compile_ours_s": (3.0, "max"),
+    "identification_ratio": (6.0, "min"),
+    "identification_extra_mb": (100.0, "max"),
+}
+
+
+def missed(name: str, metrics: dict[str, float], slack: float) -> str | None:
+    """Why this goal is not met; None if it is."""
+    goal, sense = GOALS[name]
+    value = metrics.get(name, math.nan)
+    met = value >= goal * slack if sense == "min" else value <= goal / slack
+    return None if met else f"{name}: {value:.3g}, goal {'at least' if sense == 'min' else 'at most'} {goal:g}"
+
+
+def table(metrics: dict[str, float]) -> str:
+    """All metrics, with their goals, as a Markdown table."""
+    rows = ["| metric | value | goal |", "|---|---|---|"]
+    for name, value in metrics.items():
+        goal, sense = GOALS.get(name, (None, ""))
+        wanted = "" if goal is None else f"{'>=' if sense == 'min' else '<='} {goal:g}"
+        rows.append(f"| {name} | {value:.3g} | {wanted} |")
+    return "\n".join(rows)
+
+
+def page(results: dict) -> str:
+    """README.md of this folder, out of the results alone."""
+    made = ", ".join(f"{name} {value}" for name, value in results["machine"].items())
+    return (
+        "# Benchmarks\n\n"
+        "Written by `python benchmarks/run.py` (needs the extra `bench`); don't edit.\n\n"
+        f"IRB 140, float64, default XLA options, pinned to one core; processor time, median of {results['rounds']} "
+        "rounds in which ours and the peer's run in turn; compile time is that of the first call less the second's. "
+        "`1e3`, `1e5`: samples a call. `per_s`: samples a second. `paper_style`: M, Christoffel C and g, against C by "
+        "`jacfwd` of M. `identification`: 60 000 samples of six joints, Gram matrix and solution, against Pinocchio's "
+        f"regressor loop and NumPy's lstsq.\n\n{made}\n\n{table(results['metrics'])}\n"
+    )
