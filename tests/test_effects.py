@@ -1,0 +1,391 @@
+"""What every effect of the catalogue must keep: its formula, its units, its bounds, and the laws of physics."""
+
+import re
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from helpers import random_robot
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from irb140_jax import dynamics, effects
+from irb140_jax.effects import Motion, Scales
+from irb140_jax.effects.catalogue import CATALOGUE, _found
+from irb140_jax.mismatch.model import CorrectedModel, Named, predict
+from irb140_jax.recordings.concealed.catalogue import HIDDEN
+from irb140_jax.recordings.condition import Band
+from irb140_jax.recordings.recording import Recording
+from irb140_jax.robot import robot_from_model
+
+# The contract's vocabulary, with the parameters that a finding must give.
+VOCABULARY = {
+    "coulomb_friction": {"coulomb"},
+    "viscous_friction": {"viscous"},
+    "asymmetric_friction": {"coulomb_pos", "coulomb_neg"},
+    "stribeck_friction": {"coulomb", "static", "stribeck_velocity"},
+    "nonlinear_viscous_friction": {"coefficient", "exponent"},
+    "load_dependent_friction": {"load_coefficient", "coulomb"},
+    "thermal_friction_drift": {"viscous_cold", "relative_drop", "time_constant"},
+    "presliding_hysteresis": {"coulomb", "stiffness"},
+    "position_dependent_friction": {"coulomb", "depth", "centre", "width"},
+    "rotor_inertia": {"inertia"},
+    "torque_gain": {"gain"},
+    "torque_offset": {"offset"},
+    "torque_ripple": {"amplitude", "cycles_per_rad"},
+    "actuator_lag": {"time_constant"},
+    "time_delay": {"delay"},
+    "joint_elasticity": {"stiffness"},
+    "backlash": {"gap"},
+    "transmission_coupling": {"viscous"},
+    "gravity_spring": {"stiffness", "rest"},
+    "gravity_tilt": {"tilt"},
+    "payload": {"mass"},
+    "encoder_offset": {"offset"},
+    "contact": {"stiffness"},
+    "external_wrench": {"t0", "t1"},
+}
+NOW = {
+    "coulomb_friction", "viscous_friction", "asymmetric_friction", "stribeck_friction", "load_dependent_friction",
+    "rotor_inertia", "torque_offset", "torque_gain", "transmission_coupling",
+}  # fmt: skip
+
+# The contract's equations written down once more: parameters, then qd, qdd, load and total torque of the site, (T, m).
+SIGN = {"sign": -1.0}
+LAWS = {
+    "coulomb_friction": lambda p, v, a, load, total: p["coulomb"] * np.sign(v),
+    "viscous_friction": lambda p, v, a, load, total: p["viscous"] * v,
+    "asymmetric_friction": lambda p, v, a, load, total: np.where(v > 0, p["coulomb_pos"], -p["coulomb_neg"]),
+    "stribeck_friction": lambda p, v, a, load, total: np.sign(v) * (
+        p["coulomb"] + (p["static"] - p["coulomb"]) * np.exp(-((v / p["stribeck_velocity"]) ** 2))),
+    "load_dependent_friction": lambda p, v, a, load, total: np.sign(v) * (
+        p["coulomb"] + p["load_coefficient"] * np.abs(load)),
+    "rotor_inertia": lambda p, v, a, load, total: p["inertia"] * a,
+    "torque_offset": lambda p, v, a, load, total: np.full_like(v, p["offset"]),
+    "torque_gain": lambda p, v, a, load, total: total / p["gain"] - total,
+    "transmission_coupling": lambda p, v, a, load, total: np.stack([
+        p["viscous"] * (v[:, 0] - v[:, 1]) + p["coulomb"] * np.sign(v[:, 0] - v[:, 1]),
+        p["viscous"] * (v[:, 1] - v[:, 0]) + p["coulomb"] * np.sign(v[:, 1] - v[:, 0])], axis=1),
+}  # fmt: skip
+
+every_effect = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=CATALOGUE.keys())
+every_dissipative_effect = pytest.mark.parametrize(
+    "effect", [e for e in CATALOGUE.values() if e.dissipative], ids=lambda e: e.slug
+)
+KINDS = "SHSH"  # slides and hinges, two of each
+RESTING = 1e-9  # [rad/s or m/s]: sign(qd) is then rounded off nowhere along `motion`
+SCALES = Scales(np.array([0.4, 2.0, 0.5, 3.0]), np.array([1e-3, 2e-3, 1e-3, 1e-2]), np.array([50.0, 9.0, 20.0, 1.0]))
+
+
+def motion(seed=0, samples=60, rest_speed=RESTING):
+    """Random motion, no joint slower than 0.01."""
+    rng = np.random.default_rng(seed)
+    q, qd, qdd, load, total = rng.normal(size=(5, samples, len(KINDS)))
+    qd += 0.01 * np.sign(qd)
+    arrays = [jnp.asarray(x) for x in (q, qd, qdd, 9 * load, 10 * total)]
+    return Motion(jnp.arange(samples) / 100.0, *arrays, rest_speed=jnp.full(len(KINDS), rest_speed))
+
+
+def robot():
+    return random_robot(KINDS, 1)[0]
+
+
+def a_shape(effect, joints=0):
+    """A shape in the middle of the grid."""
+    site = effect.sites(robot())[joints]
+    grid = effect.shapes(SCALES, site)
+    return jnp.asarray(site), jnp.asarray(grid[len(grid) // 2])
+
+
+def admissible(effect):
+    """Physical parameters within their bounds; those bounded by zero stay above 0.001, as a law of none is none."""
+    return st.fixed_dictionaries({
+        p.name: st.floats(max(p.low, -100.0) + (1e-3 if p.low == 0.0 else 0.0), min(p.high, 100.0))
+        for p in effect.parameters
+    })  # fmt: skip
+
+
+def some_values(effect, seed=0):
+    """Physical parameters away from zero, from one and from each other."""
+    rng = np.random.default_rng(seed)
+    return {p.name: float(rng.uniform(max(p.low, 0.3) + 0.02, min(p.high, 2.0) - 0.02)) for p in effect.parameters}
+
+
+def test_the_catalogue_holds_these_effects_of_the_vocabulary_and_no_other():
+    assert set(CATALOGUE) == NOW
+    assert NOW <= set(VOCABULARY)
+
+
+@every_effect
+def test_words_that_a_report_needs_are_there(effect):
+    assert all(len(text) > 2 for text in (effect.title, effect.equation, effect.source, effect.needs))
+    assert re.search(r"1[789]\d\d|20\d\d", effect.source), "a source has a year"
+    assert not effect.needs.endswith(".")  # sentences are made around it
+    assert effect.__doc__
+
+
+@every_effect
+def test_parameters_are_those_of_the_contract(effect):
+    assert VOCABULARY[effect.slug] <= {p.name for p in effect.parameters}
+
+
+@every_effect
+def test_units_are_rendered_for_hinges_and_for_slides(effect):
+    for p in effect.parameters:
+        hinge, slide = effect.unit(p, False), effect.unit(p, True)
+        assert not re.search(r"[{}]", hinge + slide)
+        assert "rad" not in slide and "N m" not in slide
+        assert not re.search(r"\bN\b(?! m)|/m\b", hinge)
+
+
+@every_effect
+def test_units_are_those_of_the_physics_that_mujoco_hides(effect):
+    for p in effect.parameters:
+        if p.name in HIDDEN[effect.slug].units:
+            assert p.unit == HIDDEN[effect.slug].units[p.name]
+
+
+@every_effect
+def test_bounds_are_ordered(effect):
+    assert all(p.low < p.high for p in effect.parameters)
+    for joints in effect.sites(robot()):
+        lowest, highest = effect.lowest(robot(), joints), effect.highest(robot(), joints)
+        assert (lowest < highest).all() and (lowest <= 0).all() and (highest >= 0).all()
+
+
+@every_effect
+def test_columns_bounds_and_variants_are_of_one_length(effect):
+    joints, shape = a_shape(effect)
+    columns = effect.columns(motion(), joints, shape)
+    assert columns.shape == (60, len(joints), max(max(v) for v in effect.variants) + 1)
+    assert len(effect.lowest(robot(), joints)) == len(effect.highest(robot(), joints)) == columns.shape[-1]
+    assert effect.physical(jnp.ones(columns.shape[-1]), shape).shape == (len(effect.parameters),)
+
+
+@every_effect
+def test_sites_are_different_groups_of_joints_of_the_robot(effect):
+    sites = [tuple(s) for s in effect.sites(robot()).tolist()]
+    assert sites and len(set(sites)) == len(sites)
+    assert all(0 <= j < len(KINDS) for s in sites for j in s)
+    assert all(len({KINDS[j] for j in s}) == 1 for s in sites)  # one unit serves all joints of a site
+
+
+@every_effect
+def test_shape_grids_are_equally_long_at_every_site_and_without_repetition(effect):
+    grids = [effect.shapes(SCALES, joints) for joints in effect.sites(robot())]
+    assert len({g.shape for g in grids}) == 1
+    assert all(np.isfinite(g).all() and len(np.unique(g, axis=0)) == len(g) for g in grids)
+
+
+@every_effect
+def test_shape_grids_stand_for_a_joint_that_never_moves(effect):
+    still = Scales(np.zeros(len(KINDS)), np.full(len(KINDS), 1e-6), np.full(len(KINDS), 1e-12))
+    for joints in effect.sites(robot()):
+        for shape in effect.shapes(still, joints):
+            assert np.isfinite(effect.columns(motion(), jnp.asarray(joints), jnp.asarray(shape))).all()
+
+
+@every_effect
+@given(data=st.data())
+@settings(max_examples=30, deadline=None)
+def test_physical_parameters_are_recovered_from_their_amplitudes(effect, data):
+    values = data.draw(admissible(effect))
+    w, shape = effect.amplitudes(values)
+    again = effect.physical(jnp.asarray(w), jnp.asarray(shape))
+    # Sums and differences of numbers up to 100, nothing else: rounding.
+    np.testing.assert_allclose(again, [values[p.name] for p in effect.parameters], rtol=1e-12, atol=1e-12)
+
+
+@every_effect
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=15, deadline=None)
+def test_amplitudes_are_recovered_from_their_physical_parameters(effect, seed):
+    rng, (joints, shape) = np.random.default_rng(seed), a_shape(effect)
+    low, high = effect.lowest(robot(), joints), effect.highest(robot(), joints)
+    w = rng.uniform(np.maximum(low, -5.0), np.minimum(high, 5.0))
+    values = dict(zip([p.name for p in effect.parameters], effect.physical(jnp.asarray(w), shape), strict=True))
+    if effect.slug == "transmission_coupling":
+        values["sign"] = shape[0]  # no parameter of the vocabulary: it must be told beside them
+    again, shape_again = effect.amplitudes(values)
+    np.testing.assert_allclose(again, w, atol=1e-12)
+    np.testing.assert_allclose(shape_again, shape, atol=1e-12)
+
+
+@every_effect
+def test_columns_are_the_formula_of_the_contract(effect):
+    for site in range(len(effect.sites(robot()))):
+        for seed in range(3):
+            joints, _ = a_shape(effect, site)
+            m, values = motion(seed), some_values(effect, seed)
+            w, shape = effect.amplitudes(values | SIGN)
+            torque = effect.columns(m, joints, jnp.asarray(shape)) @ jnp.asarray(w)
+            along = (np.asarray(x)[:, joints] for x in (m.qd, m.qdd, m.load, m.total))
+            np.testing.assert_allclose(torque, LAWS[effect.slug](values, *along), rtol=1e-12, atol=1e-12)
+
+
+@every_effect
+def test_zero_strength_is_no_torque(effect):
+    joints, shape = a_shape(effect)
+    columns = effect.columns(motion(), joints, shape)
+    assert (columns @ jnp.zeros(columns.shape[-1]) == 0.0).all()
+
+
+@every_effect
+def test_every_parameter_moves_the_torque(effect):
+    joints, _ = a_shape(effect)
+    torque = lambda v: np.asarray(effect.columns(motion(), joints, jnp.asarray(v[1])) @ v[0])  # noqa: E731
+    values = some_values(effect)
+    before = torque(effect.amplitudes(values))
+    for name in values:
+        after = torque(effect.amplitudes(values | {name: 1.1 * values[name]}))
+        assert np.linalg.norm(after - before) > 1e-3 * np.linalg.norm(before), name
+
+
+@every_effect
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_derivatives_by_motion_and_shape_are_finite_also_at_rest(effect, speed):
+    joints, shape = a_shape(effect)
+    m = motion(rest_speed=1e-3)
+    m = eqx.tree_at(lambda x: (x.qd, x.qdd, x.load, x.total), m, (speed * m.qd, speed * m.qdd, speed * m.load, m.total))
+    weights = np.random.default_rng(1).normal(size=effect.columns(m, joints, shape).shape)
+    slopes = jax.grad(lambda x: jnp.sum(weights * effect.columns(x[0], joints, x[1])))((m, shape))
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(slopes))
+
+
+def test_friction_and_nothing_else_is_said_to_be_dissipative():
+    friction = {slug for slug in CATALOGUE if slug.endswith("friction")} | {"transmission_coupling"}
+    assert {slug for slug, effect in CATALOGUE.items() if effect.dissipative} == friction
+
+
+@every_dissipative_effect
+@given(data=st.data(), seed=st.integers(0, 10**6))
+@settings(max_examples=20, deadline=None)
+def test_dissipative_effects_never_give_energy_to_the_arm(effect, data, seed):
+    joints, grid_shape = a_shape(effect)
+    w, shape = effect.amplitudes(data.draw(admissible(effect)))
+    shape = grid_shape if effect.slug == "transmission_coupling" else jnp.asarray(shape)
+    m = motion(seed, rest_speed=1e-2)
+    power = jnp.sum(effect.columns(m, joints, shape) @ w * m.qd[:, joints], axis=1)
+    # Rounding of a difference of 100s.
+    assert (power >= -1e-12).all()
+
+
+@every_dissipative_effect
+def test_the_smallest_admissible_friction_leaves_none_below_zero_in_the_model(effect):
+    m, arm = motion(), robot()
+    own = arm.damping * m.qd + arm.frictionloss * jnp.sign(m.qd)
+    for site, joints in enumerate(effect.sites(arm)):
+        _, shape = a_shape(effect, site)
+        taken = effect.columns(m, jnp.asarray(joints), shape) @ effect.lowest(arm, joints)
+        # Rounding: what is taken off may be exactly what was there.
+        assert (jnp.sum((own[:, joints] + taken) * m.qd[:, joints], axis=1) >= -1e-12).all()
+
+
+def test_the_smallest_admissible_rotor_takes_off_the_rotor_of_the_model():
+    rotor, m, arm = CATALOGUE["rotor_inertia"], motion(), robot()
+    for j in range(arm.n):
+        taken = rotor.columns(m, jnp.array([j]), jnp.zeros(0)) @ rotor.lowest(arm, np.array([j]))
+        np.testing.assert_allclose(taken[:, 0], -arm.armature[j] * m.qdd[:, j], rtol=1e-12)
+
+
+@every_effect
+def test_compiled_columns_are_those_of_the_plain_function(effect):
+    joints, shape = a_shape(effect)
+    plain = effect.columns(motion(), joints, shape)
+    # Compilers may fuse and reorder: a few roundings.
+    np.testing.assert_allclose(eqx.filter_jit(effect.columns)(motion(), joints, shape), plain, rtol=1e-13, atol=1e-15)
+
+
+@every_effect
+def test_a_law_can_be_every_special_case_that_it_contains(effect):
+    joints, shape = a_shape(effect)
+    columns = np.asarray(effect.columns(motion(), joints, shape)).reshape(-1, max(max(v) for v in effect.variants) + 1)
+    for slug in effect.contains:
+        special = CATALOGUE[slug].columns(motion(), joints, a_shape(CATALOGUE[slug])[1])
+        special = np.asarray(special).reshape(len(columns), -1)
+        w = np.linalg.lstsq(columns, special, rcond=None)[0]
+        np.testing.assert_allclose(columns @ w, special, atol=1e-12)
+
+
+@every_effect
+def test_look_alikes_have_names_of_the_vocabulary_and_a_motion_that_separates_them(effect):
+    assert effect.slug not in effect.confused_with
+    assert set(effect.confused_with) <= set(VOCABULARY)
+    assert all(len(m) > 10 and not m.endswith(".") for m in effect.confused_with.values())
+
+
+@every_effect
+@pytest.mark.parametrize("is_slide", [False, True])
+def test_where_an_effect_acts_is_one_sentence_with_numbers_and_units(effect, is_slide):
+    units = {p.name: effect.unit(p, is_slide) for p in effect.parameters}
+    said = effect.where("joint7", some_values(effect), units)
+    assert "joint7" in said and re.search(r"\d", said) and not re.search(r"[{}\n]", said)
+
+
+@pytest.mark.parametrize("effect", [e for e in CATALOGUE.values() if e.mjcf], ids=lambda e: e.slug)
+def test_what_mjcf_expresses_is_the_same_in_the_model_as_beside_it(effect):
+    element, attribute = effect.mjcf.split()
+    assert element == "joint"
+    arms = [
+        robot_from_model(mujoco.MjModel.from_xml_string(
+            '<mujoco><worldbody><body><inertial pos="0.1 0.2 0.3" mass="2" diaginertia="0.1 0.2 0.25"/>'
+            f'<joint name="a" axis="0 1 0" stiffness="0.1" {extra}/></body></worldbody></mujoco>'))
+        for extra in ("", f'{attribute}="0.7"')
+    ]  # fmt: skip
+    rng = np.random.default_rng(2)
+    q, qd, qdd = rng.normal(size=(3, 5, 1))
+    tau = [np.stack([dynamics.inverse_dynamics(arm, *x) for x in zip(q, qd, qdd, strict=True)]) for arm in arms]
+    arrays = [jnp.asarray(x) for x in (q, qd, qdd, q, q)]
+    m = Motion(jnp.arange(5.0), *arrays, rest_speed=jnp.full(1, RESTING))
+    w, shape = effect.amplitudes({effect.parameters[0].name: 0.7})
+    torque = effect.columns(m, jnp.arange(1), jnp.asarray(shape))[:, 0] @ w
+    # Torques of some 10 N m: rounding.
+    np.testing.assert_allclose((tau[1] - tau[0])[:, 0], torque, atol=1e-12)
+
+
+def test_a_model_corrected_by_effects_of_zero_strength_predicts_the_nominal_torque_bit_for_bit():
+    arm = robot()
+    named = []
+    for effect in CATALOGUE.values():
+        joints, shape = a_shape(effect)
+        width = max(max(v) for v in effect.variants) + 1
+        named.append(Named(effect, tuple(joints.tolist()), tuple(range(width)), np.zeros(width), np.asarray(shape)))
+    phi = np.asarray(arm.phi)
+    model = CorrectedModel(arm, phi, phi, tuple(named), Band(torque=10.0, position=16.0, rate=200.0, step=4))
+    t = np.arange(0.0, 2.0, 0.005)
+    q = np.sin(t[:, None] * np.arange(1.0, 5.0))
+    out = predict(model, Recording(t, q, np.zeros_like(q), arm.joint_names))
+    assert np.abs(out["nominal"]).max() > 1.0
+    assert np.array_equal(out["corrected"], out["nominal"]) and np.array_equal(out["refit"], out["nominal"])
+
+
+def test_two_effects_of_one_slug_are_refused_by_name(tmp_path, monkeypatch):
+    source = (
+        "from irb140_jax.effects.coulomb_friction import CoulombFriction\n\n\n"
+        "class SecondCoulomb(CoulombFriction):\n    pass\n"
+    )
+    (tmp_path / "zz_second_coulomb.py").write_text(source, encoding="utf-8")
+    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+    with pytest.raises(TypeError, match="coulomb_friction.*SecondCoulomb"):
+        _found()
+
+
+def test_the_catalogue_skips_what_a_file_only_imports(tmp_path, monkeypatch):
+    (tmp_path / "zz_imports.py").write_text(
+        "from irb140_jax.effects.coulomb_friction import CoulombFriction as Mine\n", encoding="utf-8")  # fmt: skip
+    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+    assert set(_found()) == set(CATALOGUE)
+
+
+@pytest.mark.parametrize("effect", ["coulomb_friction", "stribeck_friction"])
+def test_direction_is_rounded_off_below_the_speed_that_noise_hides(effect):
+    law = CATALOGUE[effect]
+    joints, shape = a_shape(law)
+    column = partial(law.columns, joints=joints, shape=shape)
+    m = motion(rest_speed=1e-2)
+    at = lambda v: column(eqx.tree_at(lambda x: x.qd, m, jnp.full_like(m.qd, v)))[0, 0, 0]  # noqa: E731
+    assert abs(at(1e-4)) < 0.02 and abs(at(0.1) - 1.0) < 1e-6 and abs(at(-0.1) + 1.0) < 1e-6
