@@ -66,7 +66,7 @@ def base_parameters(robot: Robot, samples: int = 50, *, key: Array | None = None
     return BaseParameters(columns, grouping, names)
 
 
-def _name(first: int, row: Float[np.ndarray, " k"], robot: Robot) -> str:
+def _name(first: int | np.integer, row: Float[np.ndarray, " k"], robot: Robot) -> str:
     """The combination in words, its own independent parameter first."""
     word = lambda k: f"{robot.joint_names[k // 10]}.{PARTS[k % 10]}"  # noqa: E731
     others = [k for k in np.flatnonzero(row) if k != first]

@@ -33,7 +33,7 @@ class Plan(eqx.Module):
     """
 
     known: Known = eqx.field(static=True)
-    regroup: Float[Array, "10*n 10*n"] | None
+    regroup: Float[Array, "k k"] | None
     is_slide: tuple[bool, ...] = eqx.field(static=True)
 
 

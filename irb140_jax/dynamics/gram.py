@@ -17,7 +17,7 @@ def regressor_gram(
     qdd: JointSamples,
     tau: JointSamples,
     weight: JointSamples | None = None,
-) -> Float[Array, "10*n+1 10*n+1"]:
+) -> Float[Array, "g g"]:
     """Gram matrix W^T W of W = diag(weight) [Y, tau], stacked over all samples and joints.
 
     All that least squares needs: Y^T Y phi = Y^T tau, and the squared residual from the last diagonal entry.  The rows
@@ -41,7 +41,7 @@ def regressor_gram(
     return sum_of_chunks(_gram_of_chunk, given, (q, qd, qdd, tau, weights))
 
 
-def _gram_of_chunk(given: tuple[Robot, Plan], q, qd, qdd, tau, weight) -> Float[Array, "10*n+1 10*n+1"]:
+def _gram_of_chunk(given: tuple[Robot, Plan], q, qd, qdd, tau, weight) -> Float[Array, "g g"]:
     n = q.shape[1]
     blocks = regressor_blocks(chain(*given), q.T, qd.T, qdd.T)
     gram = jnp.zeros((10 * n + 1, 10 * n + 1), q.dtype)

@@ -18,7 +18,7 @@ from irb140_jax.types import Joints, JointSamples
 Screw = tuple[Vector, Vector]
 
 
-def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, "n 10*n"]:
+def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, "n k"]:
     """Matrix Y of the rigid bodies' torques, Y phi + armature qdd + passive = inverse dynamics.
 
     Args:
@@ -35,7 +35,7 @@ def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, 
     return _regressor(robot, plan(robot, regrouped=False), q, qd, qdd)
 
 
-def regressor_batch(robot: Robot, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> Float[Array, "T n 10*n"]:
+def regressor_batch(robot: Robot, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> Float[Array, "T n k"]:
     """`regressor` of T samples, arrays of shape (T, n) -> (T, n, 10 n)."""
     return in_chunks(_regressor_of_chunk, (robot, plan(robot, regrouped=False)), (q, qd, qdd))
 
@@ -47,7 +47,7 @@ def _regressor_of_chunk(given: tuple[Robot, Plan], q: JointSamples, qd: JointSam
 @jax.jit
 def _regressor(
     robot: Robot, ahead: Plan, q: Float[Array, "n *T"], qd: Float[Array, "n *T"], qdd: Float[Array, "n *T"]
-) -> Float[Array, "n 10*n *T"]:
+) -> Float[Array, "n k *T"]:
     columns = []
     for i, block in enumerate(regressor_blocks(chain(robot, ahead), q, qd, qdd)):
         missing = [(0, robot.n - i - 1)] + [(0, 0)] * (block.ndim - 1)

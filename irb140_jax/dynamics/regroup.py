@@ -14,7 +14,7 @@ def regrouping(
     position: Float[np.ndarray, "n 3"],
     axis: Float[np.ndarray, "n 3"],
     is_slide: tuple[bool, ...],
-) -> tuple[Float[np.ndarray, "10*n 10*n"], np.ndarray]:
+) -> tuple[Float[np.ndarray, "k k"], np.ndarray]:
     """Linear map of `Robot.phi` (raveled) onto parameters of the same torques, and which of them are zero always.
 
     A hinge with axis a does not move a body of mass m at a point of a, with inertia J (1 - a a^T): its momentum is the
