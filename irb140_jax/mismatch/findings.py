@@ -7,7 +7,8 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.evidence import eliminated
+from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.evidence import eliminated, gain_of
 from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.name import PREFER, group_odds
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
@@ -109,20 +110,45 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
     """Log odds of every effect that could stand in a finding's place, and of none (slug "")."""
     c = ex.data.candidates[index]
     H = ex.problem.without(_others(ex, index))
+    taken = {(ex.data.candidates[i].slug, ex.data.candidates[i].joints) for i in _others(ex, index)}
     odds = {
         key: value
         for key, value in group_odds(ex.problem, H).items()
-        if set(key[1]) & set(c.joints) and key[0] != "inertials"
+        if set(key[1]) & set(c.joints) and key[0] != "inertials" and key not in taken
     }
-    odds["", ()] = 0.0
     guard = ex.problem.guard(ex.chosen)[list(c.joints)].max()
     own = odds[c.slug, c.joints]
-    # Within what an imperfect law could feign, a rival is as good as the named law; a special case has already lost by
-    # more than that, and a law that contains the named one was not needed.
     for key, value in odds.items():
-        if key[0] and key != (c.slug, c.joints) and key[0] not in c.effect.contains:
-            within = guard + PREFER if value > own else guard * (c.slug not in CATALOGUE[key[0]].contains)
-            odds[key] = own if abs(value - own) <= within else value
+        if key == (c.slug, c.joints) or key[0] in c.effect.contains:
+            continue  # a special case has already lost by more than what an imperfect law could feign
+        excess = value - own
+        if c.slug in CATALOGUE[key[0]].contains:
+            # A law that contains the named one was not needed; even odds where the search would have taken it.
+            odds[key] = own + (PREFER * (excess / (guard + PREFER) - 1.0) if excess > 0 else excess - PREFER)
+        elif abs(excess) <= guard:
+            odds[key] = own  # within what an imperfect law could feign, a rival is as good as the named law
+    for key, value in _pairs(ex, H, c).items():
+        odds[key] = max(odds.get(key, -np.inf), min(value, own))
+    odds["", ()] = 0.0
+    return odds
+
+
+def _pairs(ex: Explanation, H: np.ndarray, c: Candidate) -> dict[tuple[str, tuple[int, ...]], float]:
+    """Log odds of a special case of the named law together with one more effect, under the latter's name.
+
+    The special case (say, Coulomb friction) is so common that it costs no prior odds.
+    """
+    odds: dict[tuple[str, tuple[int, ...]], float] = {}
+    for special in ex.data.candidates:
+        if special.slug not in c.effect.contains or special.joints != c.joints:
+            continue
+        columns = special.columns + ex.problem.offset
+        base = gain_of(H, columns)
+        rest = group_odds(ex.problem, eliminated(H, columns)[0])
+        for (slug, joints), value in rest.items():
+            known = slug == "inertials" or slug in c.effect.contains or slug == c.slug
+            if joints == c.joints and not known and special.slug not in CATALOGUE[slug].contains:
+                odds[slug, joints] = base + value
     return odds
 
 
