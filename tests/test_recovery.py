@@ -1,0 +1,116 @@
+"""What MuJoCo hides in a machine is named, with joints and parameters; where nothing is hidden nothing is named.
+
+The diagnosis gets a model and recordings; the truth stays here.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch import Result, diagnose, predict
+from irb140_jax.recordings.conceal import ConcealedCase, Concealment, conceal, random_robot
+from irb140_jax.recordings.concealed.plant import arm_spec
+from irb140_jax.recordings.excite import three_motions
+from irb140_jax.robot import Robot, robot_from_model
+
+SEED, JOINTS, SLIDES = 6, 3, 0.3  # a hinge that carries two slides
+# Where each effect is something of its own: gains and rotors where a joint carries more than itself.
+HIDDEN_ON = {
+    "coulomb_friction": ("joint1",),
+    "viscous_friction": ("joint2",),
+    "asymmetric_friction": ("joint3",),
+    "stribeck_friction": ("joint1",),
+    "load_dependent_friction": ("joint2",),
+    "rotor_inertia": ("joint2",),
+    "torque_offset": ("joint1",),
+    "torque_gain": ("joint2",),
+    "transmission_coupling": ("joint2", "joint3"),
+}
+SHARE = 0.15  # of the joint's torque
+
+
+def machine(
+    seed: int, joints: int, slides: float, *concealments: Concealment, moves: int | None = None
+) -> tuple[Robot, ConcealedCase]:
+    """A random machine with 5 % wrong inertials, noisy sensors and the hidden effects, and three motions of 10 s."""
+    xml = random_robot(seed, joints, slides=slides)
+    robot = robot_from_model(arm_spec(xml).compile(), "random")
+    motions = three_motions(robot, 10.0, 500.0, seed=seed if moves is None else moves)
+    return robot, conceal(xml, concealments, motions, seed=seed + len(concealments))
+
+
+@cache
+def diagnosed(effect: str) -> tuple[ConcealedCase, Result]:
+    """The case with this effect hidden in it, and the diagnosis of its recordings."""
+    robot, case = machine(SEED, JOINTS, SLIDES, Concealment(effect, HIDDEN_ON[effect], SHARE))
+    return case, diagnose(robot, case.recordings)
+
+
+every_effect = pytest.mark.parametrize("effect", HIDDEN_ON)
+
+
+def test_every_effect_of_the_catalogue_is_hidden_once():
+    assert set(HIDDEN_ON) == set(CATALOGUE)
+
+
+@every_effect
+def test_the_hidden_effect_is_named_on_its_joints_and_nothing_else_is(effect):
+    diagnosis = diagnosed(effect)[1].diagnosis
+    assert diagnosis["verdict"] == "physics_left_out"
+    assert [(f["effect"], tuple(f["joints"])) for f in diagnosis["findings"]] == [(effect, HIDDEN_ON[effect])]
+    assert effect not in {entry["effect"] for entry in diagnosis["not_testable"]}
+
+
+@every_effect
+def test_parameters_of_the_hidden_effect_are_recovered(effect):
+    case, result = diagnosed(effect)
+    found = result.diagnosis["findings"][0]["parameters"]
+    for name, truth in case.truth["effects"][0]["parameters"].items():
+        if name == "sign":  # no parameter of the vocabulary
+            continue
+        # Every search started without the effect, that is at zero.
+        error = abs(found[name]["value"] - truth["value"])
+        assert error < max(0.1 * abs(truth["value"]), 4.0 * found[name]["std"]), name
+        assert found[name]["unit"] == truth["unit"]
+
+
+@every_effect
+def test_the_correction_takes_off_half_of_what_refitting_leaves_on_unseen_data(effect):
+    fit = diagnosed(effect)[1].diagnosis["fit"]
+    beyond_noise = lambda j, kind: np.sqrt(max(fit[j][kind] ** 2 - fit[j]["noise_floor"] ** 2, 0.0))  # noqa: E731
+    for joint in fit:
+        assert fit[joint]["rmse_corrected"] <= 1.02 * fit[joint]["rmse_refit"]
+        # Heavier links stand in for much of a rotor; what they can't is below the noise here.
+        if joint in HIDDEN_ON[effect] and effect != "rotor_inertia":
+            assert beyond_noise(joint, "rmse_corrected") < 0.5 * beyond_noise(joint, "rmse_refit")
+
+
+def test_the_corrected_model_predicts_other_moves_of_the_machine():
+    case, result = diagnosed("stribeck_friction")
+    hidden = {k: v["value"] for k, v in case.truth["effects"][0]["parameters"].items()}
+    concealment = Concealment("stribeck_friction", ("joint1",), parameters=hidden)
+    recording = machine(SEED, JOINTS, SLIDES, concealment, moves=77)[1].recordings[0]
+    # Where the joint sticks, friction is whatever the drive happens to push with.
+    moving = np.abs(np.gradient(recording.q[:, 0], recording.t)) > 0.05
+    error = {
+        name: np.sqrt(np.mean((recording.tau - torque)[moving, 0] ** 2))
+        for name, torque in predict(result.model, recording).items()
+    }
+    # What is left is sensor noise over the whole band of the log, a fifth of the friction.
+    assert error["corrected"] < 0.35 * error["refit"]
+
+
+def test_a_diagnosis_is_the_same_whenever_it_is_made():
+    robot, case = machine(SEED, JOINTS, SLIDES, Concealment("torque_offset", ("joint1",), SHARE))
+    assert diagnose(robot, case.recordings).diagnosis == diagnosed("torque_offset")[1].diagnosis
+
+
+@pytest.mark.parametrize(("seed", "joints", "slides"), [(11, 1, 0.0), (12, 1, 1.0), (6, 3, 0.3), (4, 5, 0.4)])
+def test_nothing_is_named_where_nothing_is_hidden(seed, joints, slides):
+    robot, case = machine(seed, joints, slides)
+    diagnosis = diagnose(robot, case.recordings).diagnosis
+    assert diagnosis["findings"] == [] and diagnosis["unexplained"] == []
+    assert diagnosis["verdict"] in ("no_mismatch", "parameters_only")
+    assert any(robot.is_slide) == (slides > 0.0)
