@@ -2,7 +2,7 @@
 
     python experiments/blind.py demo            # the nine first effects in the IRB 140, 6 to 20 % of the joint's torque
     python experiments/blind.py clean           # wrong inertials and noise only
-    python experiments/blind.py robots          # random robots of 1 to 7 joints, slides included, effects and clean ones
+    python experiments/blind.py robots          # random robots of 1 to 7 joints, with slides; every fourth is clean
 
 Cases are appended to results/blind_<kind>.jsonl as they are done, so an interrupted run goes on where it stopped.
 `--table` writes docs/blind.md from what is there.
@@ -20,7 +20,7 @@ import tyro
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import diagnose
-from irb140_jax.recordings.conceal import Concealment, ConcealedCase, clean_case, conceal, demo_case, random_robot
+from irb140_jax.recordings.conceal import ConcealedCase, Concealment, clean_case, conceal, demo_case, random_robot
 from irb140_jax.recordings.concealed.catalogue import FIRST_NINE
 from irb140_jax.recordings.concealed.choice import meaningful_sites
 from irb140_jax.recordings.concealed.hidden import survey_of
@@ -110,13 +110,14 @@ def table(out: pathlib.Path) -> str:
     lines = [
         "# Concealed physics: what the diagnosis finds",
         "",
-        "Written by `experiments/blind.py --table` from `results/blind_*.jsonl`. MuJoCo drives the arm in closed loop with",
-        "5 % wrong inertials, encoder noise of 2e-5 rad and torque noise of 1 %; three recordings of 20 s (15 s for random",
-        "robots); effects of 6 to 20 % of the joint's torque. Errors are on recordings that the fit did not see, at the",
-        "joints of the hidden effect.",
+        "Written by `experiments/blind.py --table` from `results/blind_*.jsonl`. MuJoCo drives the arm in closed",
+        "loop with 5 % wrong inertials, encoder noise of 2e-5 rad and torque noise of 1 %; three recordings of 20 s",
+        "(15 s for random robots); effects of 6 to 20 % of the joint's torque. Errors are on recordings that the fit",
+        "did not see, at the joints of the hidden effect.",
         "",
-        "| cases | number | exact name and joints, nothing added | within the stated set | any finding | corrected error "
-        "at most half of refit's | worst corrected / refit | median parameter error | 90 % intervals that cover |",
+        "| cases | number | exact name and joints, nothing added | within the stated set | any finding "
+        "| corrected error at most half of refit's | worst corrected / refit | median parameter error "
+        "| 90 % intervals that cover |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     misses = []
@@ -125,7 +126,10 @@ def table(out: pathlib.Path) -> str:
         if not path.exists():
             continue
         cases = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-        for label, part in ((kind, [c for c in cases if c["truth"]]), (f"{kind}, nothing hidden", [c for c in cases if not c["truth"]])):
+        for label, part in (
+            (kind, [c for c in cases if c["truth"]]),
+            (f"{kind}, nothing hidden", [c for c in cases if not c["truth"]]),
+        ):
             if not part:
                 continue
             ratio = np.array([c["corrected"] / c["refit"] for c in part])
@@ -139,10 +143,18 @@ def table(out: pathlib.Path) -> str:
                 f"{ratio.max():.3f} | {f'{100 * error:.2g} %' if p else '-'} | {f'{100 * cover:.0f} %' if p else '-'} |"
             )
             misses += [(label, c) for c in part if not c["exact"]]
-    lines += ["", "## Every miss", "", "| cases | seed | hidden | found | corrected / refit error |", "|---|---|---|---|---|"]
+    lines += [
+        "",
+        "## Every miss",
+        "",
+        "| cases | seed | hidden | found | corrected / refit error |",
+        "|---|---|---|---|---|",
+    ]
     say = lambda items: "; ".join(f"{i['effect']} on {', '.join(i['joints'])}" for i in items) or "nothing"  # noqa: E731
     for label, c in misses:
-        lines.append(f"| {label} | {c['seed']} | {say(c['truth'])} | {say(c['found'])} | {c['corrected'] / c['refit']:.3f} |")
+        lines.append(
+            f"| {label} | {c['seed']} | {say(c['truth'])} | {say(c['found'])} | {c['corrected'] / c['refit']:.3f} |"
+        )
     return "\n".join(lines) + "\n"
 
 

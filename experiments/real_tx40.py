@@ -84,8 +84,15 @@ def _row(name: str, published: float, ours: dict | None) -> dict:
         return {"parameter": name, "published": published, "ours": None}
     error = ours["value"] / published - 1.0
     covered = abs(ours["value"] - published) <= COVERAGE * ours["std"]
-    return {"parameter": name, "published": published, "ours": ours["value"], "std": ours["std"],
-            "relative_error": round(error, 4), "within_10_percent": abs(error) <= 0.1, "covered": bool(covered)}  # fmt: skip
+    return {
+        "parameter": name,
+        "published": published,
+        "ours": ours["value"],
+        "std": ours["std"],
+        "relative_error": round(error, 4),
+        "within_10_percent": abs(error) <= 0.1,
+        "covered": bool(covered),
+    }
 
 
 def main() -> None:

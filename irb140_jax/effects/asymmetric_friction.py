@@ -38,6 +38,6 @@ class AsymmetricFriction(AbstractEffect):
 
     def where(self, names, values, units):
         return (
-            f"{names}: {values['coulomb_pos']:.3g} {units['coulomb_pos']} while moving up, {values['coulomb_neg']:.3g} {units['coulomb_neg']} "
-            "while moving down"
+            f"{names}: {values['coulomb_pos']:.3g} {units['coulomb_pos']} while moving up, "
+            f"{values['coulomb_neg']:.3g} {units['coulomb_neg']} while moving down"
         )

@@ -101,9 +101,7 @@ class AbstractEffect(abc.ABC):
         return False
 
     @abc.abstractmethod
-    def columns(
-        self, motion: Motion, joints: Int[Array, " m"], shape: Float[Array, " s"]
-    ) -> Float[Array, "T m k"]:
+    def columns(self, motion: Motion, joints: Int[Array, " m"], shape: Float[Array, " s"]) -> Float[Array, "T m k"]:
         """Torque on each joint of the site per unit of each amplitude, shape (T, joints of the site, amplitudes)."""
 
     @abc.abstractmethod

@@ -18,7 +18,7 @@ def _found() -> dict[str, AbstractEffect]:
                 continue
             if value.slug in catalogue:
                 raise TypeError(f"two effects share the slug {value.slug!r}: {catalogue[value.slug]} and {value}")
-            catalogue[value.slug] = value()
+            catalogue[value.slug] = value()  # pyright: ignore[reportAbstractUsage]: not the base class, see above
     return catalogue
 
 

@@ -38,7 +38,8 @@ class CoulombFriction(AbstractEffect):
         return -np.asarray(robot.frictionloss)[joints]
 
     def where(self, names, values, units):
-        return f"{names}: a step of +-{values['coulomb']:.3g} {units['coulomb']} at every reversal of the motion, whatever the speed"
+        level = f"{values['coulomb']:.3g} {units['coulomb']}"
+        return f"{names}: a step from -{level} to {level} at every reversal of the motion, whatever the speed"
 
 
 def dry_friction_columns(motion, joints, second):

@@ -30,8 +30,8 @@ class StribeckFriction(AbstractEffect):
     dissipative = True
 
     def shapes(self, scales, joints):
-        j = joints[0]
-        return geometric_grid(max(2.0 * scales.rest_speed[j], 0.003 * scales.speed[j]), 0.5 * scales.speed[j], 12)
+        speed, rest = float(scales.speed[joints[0]]), float(scales.rest_speed[joints[0]])
+        return geometric_grid(max(2.0 * rest, 0.003 * speed), 0.5 * speed, 12)
 
     def refines(self):
         return True

@@ -4,7 +4,6 @@ import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
 
-
 LARGEST = 1.5  # torque constants are known better than that; a model's torque full of noise feigns larger gains
 
 
@@ -40,4 +39,6 @@ class TorqueGain(AbstractEffect):
         return np.full(1, LARGEST - 1.0)
 
     def where(self, names, values, units):
-        return f"{names}: in proportion to the joint's whole torque; the real torque is {values['gain']:.3g} x the logged"
+        return (
+            f"{names}: in proportion to the joint's whole torque; the real torque is {values['gain']:.3g} x the logged"
+        )

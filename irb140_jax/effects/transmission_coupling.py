@@ -45,4 +45,5 @@ class TransmissionCoupling(AbstractEffect):
         return np.zeros(2)
 
     def where(self, names, values, units):
-        return f"{names}: on both joints alike, in proportion to their relative speed, {values['viscous']:.3g} {units['viscous']}"
+        viscous = f"{values['viscous']:.3g} {units['viscous']}"
+        return f"{names}: on both joints alike, in proportion to their relative speed, {viscous}"

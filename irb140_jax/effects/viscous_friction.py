@@ -36,4 +36,5 @@ class ViscousFriction(AbstractEffect):
         return -np.asarray(robot.damping)[joints]
 
     def where(self, names, values, units):
-        return f"{names}: in proportion to speed, {values['viscous']:.3g} {units['viscous']}, so mostly in the fast stretches"
+        viscous = f"{values['viscous']:.3g} {units['viscous']}"
+        return f"{names}: in proportion to speed, {viscous}, so mostly in the fast stretches"

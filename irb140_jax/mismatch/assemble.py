@@ -9,7 +9,6 @@ from irb140_jax.mismatch.candidates import Candidate, Library, Stretch
 from irb140_jax.mismatch.evidence import Grams, eliminated, grams
 from irb140_jax.mismatch.name import Problem
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
-from irb140_jax.robot import Robot
 
 TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a share of the joint's torque
 LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
@@ -81,7 +80,12 @@ def assemble(lib: Library, stretches: list[Stretch], factor: np.ndarray, uncerta
     loose = LooseInertials()
     extra = [
         Candidate(
-            loose, (k,), np.zeros(0), lib.size + 10 * k + np.arange(10), tuple(range(10)), np.full(10, -np.inf),
+            loose,
+            (k,),
+            np.zeros(0),
+            lib.size + 10 * k + np.arange(10),
+            tuple(range(10)),
+            np.full(10, -np.inf),
             np.full(10, np.inf),
         )
         for k in range(lib.robot.n)

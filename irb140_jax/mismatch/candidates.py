@@ -7,6 +7,7 @@ data forms the Gram matrix of each stretch of each joint, and from then on no se
 import dataclasses
 from collections.abc import Sequence
 from functools import partial
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -100,7 +101,21 @@ def scales_of(recordings: Sequence[Conditioned]) -> Scales:
 Loads = tuple[np.ndarray, np.ndarray]  # torque the transmissions carry and torque the motors give, each (T, n)
 
 
-def columns_along(lib: Library, recording: Conditioned, loads: Loads | None = None) -> tuple[np.ndarray, ...]:
+class Columns(NamedTuple):
+    """What stands beside the logged torque along a recording of T samples.
+
+    Attributes:
+        Y: Rigid-body regressor, shape (T, n, 10 n).
+        nominal: Torque of the nominal model [N m or N], shape (T, n).
+        effects: Columns of all candidates, shape (T, n, size), zero in rows a candidate does not touch.
+    """
+
+    Y: np.ndarray
+    nominal: np.ndarray
+    effects: np.ndarray
+
+
+def columns_along(lib: Library, recording: Conditioned, loads: Loads | None = None) -> Columns:
     """Rigid-body regressor, nominal torque and all candidate columns along a recording.
 
     Args:
@@ -108,8 +123,6 @@ def columns_along(lib: Library, recording: Conditioned, loads: Loads | None = No
         recording: T samples.
         loads: Loads along the recording [N m or N]; the nominal model's where None.
 
-    Returns:
-        Regressor (T, n, 10 n); nominal torque (T, n); columns (T, n, size), zero in rows a candidate does not touch.
     """
     T, n = recording.q.shape
     parts = []
@@ -119,13 +132,13 @@ def columns_along(lib: Library, recording: Conditioned, loads: Loads | None = No
         pad = CHUNK - len(piece[0])
         piece = [np.pad(x, ((0, pad),) + ((0, 0),) * (x.ndim - 1), mode="edge") for x in piece]
         t, q, qd, qdd, load, total = piece
-        Y = dynamics.regressor_batch(lib.robot, q, qd, qdd)
+        Y = dynamics.regressor_batch(lib.robot, jnp.asarray(q), jnp.asarray(qd), jnp.asarray(qdd))
         out = _columns(
             lib.robot, tuple(b[0] for b in lib.blocks), Y, t, q, qd, qdd, load, total, recording.rest_speed,
             [b[1] for b in lib.blocks], [b[2] for b in lib.blocks], jnp.asarray(loads is None),
         )  # fmt: skip
         parts.append([np.asarray(x)[: CHUNK - pad] for x in (Y, *out)])
-    return tuple(np.concatenate(x) for x in zip(*parts, strict=True))
+    return Columns(*(np.concatenate(x) for x in zip(*parts, strict=True)))
 
 
 # The regressor is compiled apart: fused into this program, XLA would unroll it once for every use.

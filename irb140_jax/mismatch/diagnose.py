@@ -113,9 +113,7 @@ def _model(robot: Robot, ex: Explanation, refit_grams, refit_columns: np.ndarray
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     dphi, members, amplitudes = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)
-    named = tuple(
-        Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)
-    )
+    named = tuple(Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True))
     return CorrectedModel(robot, phi + refit.reshape(phi.shape), phi + dphi.reshape(phi.shape), named, band)
 
 

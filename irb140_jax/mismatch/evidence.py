@@ -116,7 +116,7 @@ def layouts(candidates: Sequence[Candidate], offset: int) -> tuple[Layout, ...]:
     out = []
     for k in np.unique(sizes):
         which = np.flatnonzero(sizes == k)
-        out.append(Layout(which, np.stack([candidates[i].columns for i in which]) + offset))
+        out.append(Layout(which, np.stack([candidates[int(i)].columns for i in which]) + offset))
     return tuple(out)
 
 

@@ -75,26 +75,32 @@ def explain(
     factor = inertial_prior_factor(robot, 1.0)
     lib = library(robot, effects, scales_of(recordings))
     loads: list[Loads | None] = [None] * len(recordings)
-    noise, chosen = None, ()
+    chosen: tuple[int, ...] = ()
+    ex: Explanation | None = None
     for turn in range(PASSES):
         progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn + 1})")
         rows = [stretch(lib, r, i, band, load) for i, (r, load) in enumerate(zip(recordings, loads, strict=True))]
         data = assemble(lib, rows, factor, uncertainty)
-        floor = first_noise(data)
-        noise = noise or floor
         progress(f"searching sets of explanations (round {turn + 1})")
-        # The noise that the last round left may hide an effect that it named wrongly: settle it twice.
-        for _ in range(2):
-            prob, g = problem(data, noise)
-            chosen = search(prob, chosen)
-            noise = _noise_under(data, prob, g, chosen)
+        ex = _settled(lib, data, factor, chosen, ex.noise if ex else None)
+        if turn < PASSES - 1:
+            post = full_posterior(data, ex.problem, ex.grams, ex.chosen)
+            loads = [_loads(lib, data, post, ex.chosen, factor, r) for r in recordings]
+            lib, chosen = _refined(lib, data, ex.chosen)
+    assert ex is not None, "PASSES is at least one"
+    return ex
+
+
+def _settled(lib: Library, data: Data, factor: np.ndarray, chosen: tuple[int, ...], noise: Noise | None) -> Explanation:
+    """Search and noise in turn: noise that the last explanation left may hide an effect that it named wrongly."""
+    floor = first_noise(data)
+    noise = noise or floor
+    for _ in range(2):
         prob, g = problem(data, noise)
         chosen = search(prob, chosen)
-        post = full_posterior(data, prob, g, chosen)
-        loads = [_loads(lib, data, post, chosen, factor, r) for r in recordings]
-        if turn < PASSES - 1:
-            lib, chosen = _refined(lib, data, prob, chosen)
-    return Explanation(lib, data, noise, prob, g, chosen, factor, floor)
+        noise = _noise_under(data, prob, g, chosen)
+    prob, g = problem(data, noise)
+    return Explanation(lib, data, noise, prob, g, search(prob, chosen), factor, floor)
 
 
 def full_posterior(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without=None) -> Posterior:
@@ -116,7 +122,7 @@ def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -
 def _loads(lib: Library, data: Data, post: Posterior, chosen, factor: np.ndarray, r: Conditioned) -> Loads:
     """Loads of the explained model along a recording."""
     dphi, members, amplitudes = fitted(data, post, chosen, factor)
-    torques = composed(*columns_along(lib, r), members, amplitudes, dphi, dphi)
+    torques = composed(columns_along(lib, r), members, amplitudes, dphi, dphi)
     return torques.load, torques.total
 
 
@@ -138,7 +144,7 @@ def fitted(
     return dphi, members, amplitudes
 
 
-def _refined(lib: Library, data: Data, prob: Problem, chosen: tuple[int, ...]) -> tuple[Library, tuple[int, ...]]:
+def _refined(lib: Library, data: Data, chosen: tuple[int, ...]) -> tuple[Library, tuple[int, ...]]:
     """Put a finer grid of shapes around each chosen one; all else stays, so that nothing is compiled anew."""
     members = [data.candidates[c] for c in chosen]
     blocks = []

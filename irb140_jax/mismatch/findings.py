@@ -7,6 +7,7 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.evidence import eliminated, gain_of
 from irb140_jax.mismatch.explain import Explanation, full_posterior
@@ -82,7 +83,11 @@ def _shape_variance(ex: Explanation, index: int) -> np.ndarray:
     c = ex.data.candidates[index]
     if not c.effect.refines():
         return np.zeros(len(c.shape))
-    alike = [i for i, o in enumerate(ex.data.candidates) if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant]
+    alike = [
+        i
+        for i, o in enumerate(ex.data.candidates)
+        if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant
+    ]
     gain = ex.problem.scores(ex.problem.without(_others(ex, index)))[alike]
     x = np.array([float(ex.data.candidates[i].shape[0]) for i in alike])
     finite = np.isfinite(gain)
@@ -197,7 +202,7 @@ def not_testable(robot: Robot, ex: Explanation, found: set[str]) -> list[dict[st
             continue  # part of a finding, or tested against it
         columns = c.columns + ex.problem.offset
         own, _ = eliminated(H, columns[:-1])
-        z = np.sqrt(max(own[columns[-1], columns[-1]], 0.0)) * REFERENCE_SHARE / 0.3
+        z = float(np.sqrt(max(own[columns[-1], columns[-1]], 0.0))) * REFERENCE_SHARE / TYPICAL_SHARE
         key = (c.slug, c.joints)
         seen[key] = max(seen.get(key, 0.0), z)
     for (slug, joints), z in seen.items():

@@ -19,7 +19,9 @@ def heat_map(q: np.ndarray, qd: np.ndarray, edges: tuple[np.ndarray, np.ndarray]
     count, _, _ = np.histogram2d(q, qd, bins=edges)
     total, _, _ = np.histogram2d(q, qd, bins=edges, weights=r)
     mean = total / np.maximum(count, 1)
-    return [[None if c < FEW else float(m) for m, c in zip(ms, cs, strict=True)] for ms, cs in zip(mean, count, strict=True)]
+    return [
+        [None if c < FEW else float(m) for m, c in zip(ms, cs, strict=True)] for ms, cs in zip(mean, count, strict=True)
+    ]
 
 
 def maps(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Any]:

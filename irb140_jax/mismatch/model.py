@@ -10,7 +10,7 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.candidates import Candidate, Library, columns_along
+from irb140_jax.mismatch.candidates import Candidate, Columns, Library, columns_along
 from irb140_jax.recordings.condition import Band, Conditioned, condition
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
@@ -74,10 +74,21 @@ class CorrectedModel:
 
 
 def composed(
-    Y: np.ndarray, nominal: np.ndarray, columns: np.ndarray, candidates: list[Candidate], amplitudes: list[np.ndarray],
-    dphi_refit: np.ndarray, dphi_corrected: np.ndarray,
-) -> Torques:  # fmt: skip
-    """Add up a model's torques from regressor (T, n, 10 n), nominal torque (T, n) and columns (T, n, K)."""
+    along: Columns,
+    candidates: list[Candidate],
+    amplitudes: list[np.ndarray],
+    dphi_refit: np.ndarray,
+    dphi_corrected: np.ndarray,
+) -> Torques:
+    """Add up a model's torques along a recording.
+
+    Args:
+        along: Regressor, nominal torque and columns.
+        candidates: The effects.
+        amplitudes: Amplitudes of each.
+        dphi_refit, dphi_corrected: Shift of the inertial parameters in either model, shape (10 n,).
+    """
+    Y, nominal, columns = along
     load = nominal + Y @ dphi_corrected
     friction, gain = np.zeros_like(load), np.zeros_like(load)
     for c, w in zip(candidates, amplitudes, strict=True):
@@ -107,11 +118,11 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     nominal_phi = np.asarray(model.robot.phi)
     shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
     amplitudes = [named.amplitudes for named in model.named]
-    torques = composed(*columns_along(lib, recording), candidates, amplitudes, *shifts)
+    torques = composed(columns_along(lib, recording), candidates, amplitudes, *shifts)
     if not model.named:
         return torques
     # Columns that depend on the load see the corrected one, as they did in the fit.
-    return composed(*columns_along(lib, recording, (torques.load, torques.total)), candidates, amplitudes, *shifts)
+    return composed(columns_along(lib, recording, (torques.load, torques.total)), candidates, amplitudes, *shifts)
 
 
 def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray]:
@@ -167,7 +178,8 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
     leaves = {k: jnp.asarray(np.array(_infinite(v), dtype=float)) for k, v in robot["leaves"].items()}
     return CorrectedModel(
         Robot(
-            **leaves, joint_names=tuple(robot["joint_names"]), is_slide=tuple(robot["is_slide"]), name=robot["name"]
+            **leaves,  # pyright: ignore[reportArgumentType]: arrays only, static fields are named below
+ joint_names=tuple(robot["joint_names"]), is_slide=tuple(robot["is_slide"]), name=robot["name"]
         ),
         np.array(data["phi_refit"]),
         np.array(data["phi_corrected"]),

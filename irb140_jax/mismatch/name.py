@@ -72,7 +72,7 @@ class Problem:
         """
         groups = self.groups
         if joints is not None:
-            near = self.at_joint[list(joints)].any(axis=0)
+            near = np.any(self.at_joint[list(joints)], axis=0, keepdims=False).reshape(-1)
             groups = [Layout(g.which[near[g.which]], g.columns[near[g.which]]) for g in groups if near[g.which].any()]
         gain, mean = gains(H, groups, len(self.candidates), self.lowest.shape[1])
         with np.errstate(invalid="ignore"):
@@ -129,7 +129,9 @@ def _split(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
         joints = problem.candidates[d].joints
         if len(joints) < 2:
             continue
-        banned = frozenset(i for i, c in enumerate(problem.candidates) if len(c.joints) > 1 and set(c.joints) & set(joints))
+        banned = frozenset(
+            i for i, c in enumerate(problem.candidates) if len(c.joints) > 1 and set(c.joints) & set(joints)
+        )
         rest = tuple(c for c in chosen if c != d)
         other = _settled(problem, _grown(problem, rest, banned), set(joints), banned)
         H = problem.without(tuple(set(rest) & set(other)))
@@ -139,9 +141,7 @@ def _split(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
     return chosen
 
 
-def _grown(
-    problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = frozenset()
-) -> tuple[int, ...]:
+def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = frozenset()) -> tuple[int, ...]:
     """Add the best candidate, settle around it, and again, until none is worth adding."""
     seen: set[frozenset[int]] = set()
     while len(chosen) < MOST:
@@ -182,7 +182,11 @@ def _settled(
     """Exchange, simplify and remove until nothing improves, among the members at some joints or all."""
     for _ in range(30):
         near = tuple(c for c in chosen if joints is None or joints & set(problem.candidates[c].joints))
-        changed = _exchange(problem, chosen, near, banned) or _simplify(problem, chosen, near) or _remove(problem, chosen, near)
+        changed = (
+            _exchange(problem, chosen, near, banned)
+            or _simplify(problem, chosen, near)
+            or _remove(problem, chosen, near)
+        )
         if changed is None:
             return chosen
         chosen = changed

@@ -1,10 +1,10 @@
 """The noise of each joint's torque equation: an autoregression and a level per recording.
 
-Differentiated encoder noise rises with frequency, and rows must be whitened before least squares or evidence are right.
-What the model can't follow is the other way round: large at low frequency.  Whitening that would amplify the high
-frequencies, where no friction law is exact (a reversal is not a step), and bias every level down.  So the noise spectrum
-used never falls with frequency: whitening where noise rises, ordinary least squares at the level of the worst where
-it falls.  Both are then conservative.
+Differentiated encoder noise rises with frequency, and rows must be whitened before least squares or evidence are
+right.  What the model can't follow is the other way round: large at low frequency.  Whitening that would amplify the
+high frequencies, where no friction law is exact (a reversal is not a step), and bias every level down.  So the noise
+spectrum used never falls with frequency: whitening where noise rises, ordinary least squares at the level of the worst
+frequency where it falls.  Both are then conservative.
 """
 
 import dataclasses
@@ -61,9 +61,7 @@ def noise_from_residuals(residuals: list[np.ndarray], use: list[np.ndarray], dof
                  for r, u in zip(residuals, use, strict=True)]  # fmt: skip
         # Each recording counts by its shape, not by its size: the loudest must not decide the colour.
         acov = sum(
-            _autocovariance(r[:, j] / s, u[:, j])
-            for r, u, s in zip(residuals, use, scale, strict=True)
-            if s > 0
+            _autocovariance(r[:, j] / s, u[:, j]) for r, u, s in zip(residuals, use, scale, strict=True) if s > 0
         )
         ar[j], innovation = _whitener(np.atleast_1d(acov))
         rows = sum(int(u[:, j].sum()) for u in use)

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from irb140_jax.mismatch.assemble import Data, problem
+from irb140_jax.mismatch.assemble import problem
 from irb140_jax.mismatch.evidence import Grams, posterior
 from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.noise import noise_from_residuals
@@ -112,8 +112,3 @@ def jackknife_factor(ex: Explanation) -> np.ndarray:
     means = np.array(means)
     variance = (blocks - 1) / blocks * np.sum((means - means.mean(axis=0)) ** 2, axis=0)
     return np.sqrt(np.maximum(variance / np.maximum(np.diag(whole.cov), 1e-300), 1.0))
-
-
-def uses(data: Data) -> np.ndarray:
-    """Rows that count, per joint, shape (n,)."""
-    return sum(s.use.sum(axis=0) for s in data.stretches)

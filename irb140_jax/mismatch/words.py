@@ -105,7 +105,9 @@ def summary(
     said = [parts[kind]]
     by_effect: dict[str, list[str]] = {}
     for f in found:
-        by_effect.setdefault(f["effect"], []).append(" and ".join(f["joints"]) if len(f["joints"]) > 1 else f["joints"][0])
+        by_effect.setdefault(f["effect"], []).append(
+            " and ".join(f["joints"]) if len(f["joints"]) > 1 else f["joints"][0]
+        )
     for effect, joints in by_effect.items():
         said.append(f"{CATALOGUE[effect].title.capitalize()} on {_listed(joints)}.")
     undecided = [f for f in found if f["alternatives"]]

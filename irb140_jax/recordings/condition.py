@@ -5,10 +5,11 @@ from measurement and model alike.
 """
 
 import dataclasses
-import warnings
 
+import jax.numpy as jnp
 import numpy as np
 from scipy import interpolate, ndimage, signal
+from scipy.signal import windows
 
 from irb140_jax import dynamics
 from irb140_jax.recordings.recording import Recording
@@ -131,7 +132,7 @@ def _coherent_limit(smooth: list["Conditioned"], robot: Robot, band: Band) -> fl
     taper = np.hanning(window)[:, None]
     phi = np.asarray(robot.phi).ravel()
     for r in smooth:
-        Y = np.asarray(dynamics.regressor_batch(robot, r.q, r.qd, r.qdd))
+        Y = np.asarray(dynamics.regressor_batch(robot, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
         m = Y @ phi + np.asarray(robot.armature) * r.qdd
         direction = np.tanh(r.qd / r.rest_speed)
         friction = np.concatenate([direction, r.qd], axis=1)
@@ -151,7 +152,9 @@ def _coherent_limit(smooth: list["Conditioned"], robot: Robot, band: Band) -> fl
         if power.sum() <= 0:
             continue
         ridge = 1e-9 * np.trace(inputs, axis1=1, axis2=2).real[:, None, None] + 1e-300
-        known = np.einsum("fa,fa->f", cross.conj(), np.linalg.solve(inputs + ridge * np.eye(2), cross[..., None])[..., 0])
+        known = np.einsum(
+            "fa,fa->f", cross.conj(), np.linalg.solve(inputs + ridge * np.eye(2), cross[..., None])[..., 0]
+        )
         unknown = np.where(f[1:] > SLOW, np.clip(power - known.real, 0.0, None), 0.0)
         # Noise in a model torque that is small beside the logged one does no harm.
         share = np.cumsum(unknown) / np.maximum(np.cumsum(power), np.cumsum(s[:, 3, 3].real))
@@ -191,9 +194,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     notes = list(recording.notes)
     if spikes:
         notes.append(f"{spikes} torque spikes were replaced by the median of their neighbours")
-    return Conditioned(
-        recording.source, grid, q, qd, qdd, tau, ~resting & ~lost[:, None], rest_speed, tuple(notes)
-    )
+    return Conditioned(recording.source, grid, q, qd, qdd, tau, ~resting & ~lost[:, None], rest_speed, tuple(notes))
 
 
 def resting_speed(recording: Recording, qd: np.ndarray, taps: np.ndarray) -> np.ndarray:
@@ -261,9 +262,8 @@ def _signal_limit(x: np.ndarray, rate: float) -> float:
     """Frequency [Hz] up to which a position's spectrum stands above its noise; 0 for a joint at rest."""
     if np.ptp(x) == 0:
         return 0.0
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        f, p = signal.welch(x, rate, nperseg=min(len(x), int(4 * rate)), detrend="linear", window=("kaiser", 14.0))
+    window = windows.kaiser(min(len(x), int(4 * rate)), 14.0)
+    f, p = signal.welch(x, rate, window=window, detrend="linear")
     floor = np.median(p[f > 0.6 * f[-1]])
     above = np.flatnonzero(p > 10.0 * floor)
     return float(f[above[-1]]) if len(above) else 0.0

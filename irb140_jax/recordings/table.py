@@ -87,7 +87,8 @@ def _csv_table(path: pathlib.Path, notes: list[str]) -> dict[str, np.ndarray]:
         warnings.simplefilter("error", pd.errors.ParserWarning)
         frame = pd.read_csv(path, sep=separator, decimal=decimal, header=None, names=names, skiprows=1,
                             index_col=False, skipinitialspace=True, encoding="utf-8-sig", low_memory=False, comment="#")
-    return _frame_columns(frame.drop(columns=[n for n in names if n.startswith("unnamed ") and frame[n].isna().all()]))
+    empty = [n for n in names if n.startswith("unnamed ") and bool(frame[n].isna().all())]
+    return _frame_columns(frame.drop(columns=empty))
 
 
 def _frame_columns(frame: pd.DataFrame) -> dict[str, np.ndarray]:
