@@ -1,0 +1,227 @@
+"""The evidence of explanations is that of the dense Gaussian it stands for; noise is whitened, and never underrated."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal, stats
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.candidates import Candidate, Stretch
+from irb140_jax.mismatch.evidence import eliminated, gain_of, gains, grams, layouts, posterior
+from irb140_jax.mismatch.noise import ORDER, Noise, noise_from_residuals
+
+JOINTS, NUISANCES, AMPLITUDES = 2, 4, 5
+SETS = ([0], [1, 2], [3], [2, 4], [0, 4], [1])  # amplitudes of some candidates
+WHITE = np.eye(1, ORDER + 1)[0]
+
+
+def stretches(seed: int, rows: int = 70, recordings: int = 2) -> list[Stretch]:
+    """Random columns and residuals; the second joint does not feel the last amplitude."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for r in range(recordings):
+        X = rng.normal(size=(rows, JOINTS, NUISANCES + AMPLITUDES))
+        X[:, 1, -1] = 0.0
+        y = X @ rng.normal(size=X.shape[-1]) + rng.normal(size=(rows, JOINTS))
+        use = np.ones((rows, JOINTS), dtype=bool)
+        use[20:24, 0] = False
+        zero = np.zeros((rows, JOINTS))
+        out.append(Stretch(r, np.arange(rows) / 50.0, X, y, y, zero, use, zero, zero, zero))
+    return out
+
+
+def a_noise(seed: int, recordings: int = 2) -> Noise:
+    """A short whitening filter for every joint, another level for every recording."""
+    rng = np.random.default_rng(seed)
+    ar = np.tile(WHITE, (JOINTS, 1))
+    ar[:, 1:3] = rng.uniform(-0.5, 0.5, (JOINTS, 2))
+    level = rng.uniform(0.5, 2.0, (recordings, JOINTS))
+    return Noise(ar, level, level)
+
+
+def rows_by_hand(data: list[Stretch], noise: Noise) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened rows of columns and residual, all joints and recordings, by an explicit sum over lags."""
+    X, y = [], []
+    for r, s in enumerate(data):
+        for j in range(JOINTS):
+            for i in range(ORDER, len(s.t)):
+                if s.use[i - ORDER : i + 1, j].all():
+                    lags = noise.ar[j] / noise.level[r, j]
+                    X.append(lags @ s.X[i - ORDER : i + 1, j][::-1])
+                    y.append(lags @ s.y[i - ORDER : i + 1, j][::-1])
+    return np.array(X), np.array(y)
+
+
+def log_evidence(X: np.ndarray, y: np.ndarray, scale: np.ndarray) -> float:
+    """log N(y; 0, 1 + X W W X'), written out."""
+    covariance = np.eye(len(y)) + (X * scale**2) @ X.T
+    return float(stats.multivariate_normal(np.zeros(len(y)), covariance).logpdf(y))
+
+
+def candidates() -> list[Candidate]:
+    effect = CATALOGUE["coulomb_friction"]
+    limit = np.full(2, np.inf)
+    return [
+        Candidate(effect, (0,), np.zeros(0), np.array(c), tuple(range(len(c))), -limit[: len(c)], limit[: len(c)])
+        for c in SETS
+    ]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_gains_are_differences_of_dense_gaussian_evidence(seed):
+    data, noise = stretches(seed), a_noise(seed)
+    scale = np.random.default_rng(seed).uniform(0.2, 2.0, NUISANCES + AMPLITUDES)
+    G = grams(data, noise, scale, NUISANCES, blocks=4).total()
+    H, _ = eliminated(G, np.arange(NUISANCES))
+    gain, mean = gains(H, layouts(candidates(), NUISANCES), len(SETS), 2)
+    X, y = rows_by_hand(data, noise)
+    nothing = log_evidence(X[:, :NUISANCES], y, scale[:NUISANCES])
+    for k, amplitudes in enumerate(SETS):
+        columns = np.concatenate([np.arange(NUISANCES), NUISANCES + np.array(amplitudes)])
+        # Rounding of determinants of some 200 rows.
+        assert gain[k] == pytest.approx(log_evidence(X[:, columns], y, scale[columns]) - nothing, abs=1e-8)
+        assert gain_of(H, NUISANCES + np.array(amplitudes)) == pytest.approx(gain[k], abs=1e-8)
+        assert np.isnan(mean[k, len(amplitudes) :]).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_posterior_is_that_of_dense_bayesian_regression(seed):
+    data, noise = stretches(seed), a_noise(seed)
+    scale = np.random.default_rng(seed).uniform(0.2, 2.0, NUISANCES + AMPLITUDES)
+    columns = np.array([0, 1, 2, 3, 5, 7])
+    post = posterior(grams(data, noise, scale, NUISANCES, blocks=3).total(), columns)
+    X, y = rows_by_hand(data, noise)
+    X, W = X[:, columns], np.diag(scale[columns])
+    S = np.eye(len(y)) + X @ W @ W @ X.T
+    # Amplitudes and observations as one Gaussian, conditioned on the observations.
+    gain = W @ W @ X.T @ np.linalg.inv(S)
+    np.testing.assert_allclose(W @ post.mean, gain @ y, rtol=1e-9)
+    np.testing.assert_allclose(W @ post.cov @ W, W @ W - gain @ X @ W @ W, atol=1e-9)
+
+
+def test_amplitudes_of_the_gains_are_those_of_the_posterior():
+    G = grams(stretches(5), a_noise(5), np.ones(NUISANCES + AMPLITUDES), NUISANCES, blocks=4).total()
+    _, mean = gains(eliminated(G, np.arange(NUISANCES))[0], layouts(candidates(), NUISANCES), len(SETS), 2)
+    for k, amplitudes in enumerate(SETS):
+        whole = posterior(G, np.concatenate([np.arange(NUISANCES), NUISANCES + np.array(amplitudes)]))
+        np.testing.assert_allclose(mean[k, : len(amplitudes)], whole.mean[NUISANCES:], rtol=1e-9)
+
+
+@given(seed=st.integers(0, 10**6), order=st.permutations(range(AMPLITUDES)))
+@settings(max_examples=30, deadline=None)
+def test_evidence_of_a_set_does_not_depend_on_the_order_of_its_members(seed, order):
+    A = np.random.default_rng(seed).normal(size=(30, AMPLITUDES + 1))
+    H = A.T @ A
+    total, rest = 0.0, H
+    for column in order:
+        total += gain_of(rest, np.array([column]))
+        rest, _ = eliminated(rest, np.array([column]))
+    assert total == pytest.approx(gain_of(H, np.arange(AMPLITUDES)), abs=1e-9)
+
+
+def test_eliminating_costs_the_log_determinant_and_nothing_eliminates_nothing():
+    A = np.random.default_rng(0).normal(size=(20, 4))
+    H = A.T @ A
+    # det [[M, B], [B', D]] = det M det(D - B' M^-1 B)
+    rest, logdet = eliminated(H, np.arange(2))
+    np.testing.assert_allclose(logdet, np.linalg.slogdet(H[:2, :2] + np.eye(2))[1])
+    np.testing.assert_allclose(np.linalg.det(rest[2:, 2:]) * np.exp(logdet),
+                               np.linalg.det(H + np.diag([1, 1, 0, 0])))  # fmt: skip
+    assert eliminated(H, np.zeros(0, dtype=int))[1] == 0.0
+
+
+def test_blocks_and_joints_add_up_and_leaving_blocks_out_is_leaving_their_rows_out():
+    data, noise, scale = stretches(2), a_noise(2), np.full(NUISANCES + AMPLITUDES, 0.7)
+    g = grams(data, noise, scale, NUISANCES, blocks=5)
+    X, y = rows_by_hand(data, noise)
+    rows = np.concatenate([X * scale, y[:, None]], axis=1)
+    np.testing.assert_allclose(g.total(), rows.T @ rows, atol=1e-9)
+    np.testing.assert_allclose(g.per_joint.sum(axis=0), g.total(), atol=1e-9)
+    assert g.rows.sum() == len(y) and list(g.recording) == [0] * 5 + [1] * 5
+    first = rows[: int(g.rows[:5].sum())]
+    np.testing.assert_allclose(g.total(without=g.recording == 1), first.T @ first, atol=1e-9)
+
+
+def test_rows_that_do_not_count_leave_no_trace():
+    data, noise, scale = stretches(3), a_noise(3), np.ones(NUISANCES + AMPLITUDES)
+    spoiled = [dataclasses.replace(s, y=np.where(s.use, s.y, 1e6)) for s in data]
+    clean, dirty = (grams(x, noise, scale, NUISANCES, blocks=4).total() for x in (data, spoiled))
+    np.testing.assert_array_equal(clean, dirty)
+
+
+def a_noise_of(a: list[float], rows: int, seed: int = 0) -> np.ndarray:
+    """x_t + a1 x_(t-1) + ... = e_t, (rows, 1), settled."""
+    e = np.random.default_rng(seed).normal(size=rows + 500)
+    return np.asarray(signal.lfilter([1.0], [1.0, *a], e))[500:, None]
+
+
+@pytest.mark.parametrize("a", [[0.0], [0.6], [0.9, 0.3]], ids=["white", "rising", "rising steeply"])
+def test_noise_that_rises_with_frequency_is_whitened_to_unit_variance(a):
+    x = 3.0 * a_noise_of(a, 20_000)
+    noise = noise_from_residuals([x], [np.ones(x.shape, dtype=bool)], np.zeros(1))
+    white = noise.whitened(x[:, 0], 0, 0)[ORDER:]
+    assert np.std(white) == pytest.approx(1.0, abs=0.03)  # the ridge takes a per cent or two
+    white = white / np.std(white)
+    correlation = [np.mean(white[lag:] * white[:-lag]) for lag in range(1, ORDER + 1)]
+    # Four standard errors of 20 000 samples, and what the ridge leaves.
+    assert np.max(np.abs(correlation)) < 4.0 / np.sqrt(len(white)) + 0.02
+
+
+def test_whitening_learnt_from_one_stretch_whitens_another_with_its_own_level():
+    quiet, loud = a_noise_of([0.6], 10_000, seed=1), 20.0 * a_noise_of([0.6], 10_000, seed=2)
+    noise = noise_from_residuals([quiet, loud], [np.ones(quiet.shape, dtype=bool)] * 2, np.zeros(1))
+    for r, x in enumerate((quiet, loud)):
+        assert np.std(noise.whitened(x[:, 0], 0, r)[ORDER:]) == pytest.approx(1.0, abs=0.05)
+        assert noise.total[r, 0] == pytest.approx(np.std(x), rel=0.02)
+
+
+@pytest.mark.parametrize("pole", [0.5, 0.8, 0.9])
+def test_a_mean_under_noise_that_falls_with_frequency_is_not_called_surer_than_it_is(pole):
+    misses = []
+    for seed in range(200):
+        x = a_noise_of([-pole], 1000, seed)
+        noise = noise_from_residuals([x], [np.ones(x.shape, dtype=bool)], np.zeros(1))
+        one, y = (noise.whitened(v, 0, 0)[ORDER:] for v in (np.ones(len(x)), x[:, 0]))
+        misses.append((one @ y) / np.sqrt(one @ one))
+    # In claimed standard deviations; 200 draws know theirs to 5 %, and a spectrum of 10 lags its peak to some 10 %.
+    assert np.sqrt(np.mean(np.square(misses))) < 1.2
+
+
+def test_parameters_already_fitted_make_the_noise_larger():
+    x = a_noise_of([0.0], 1000)
+    use = [np.ones(x.shape, dtype=bool)]
+    without, with_fit = (noise_from_residuals([x], use, np.array([dof])) for dof in (0.0, 360.0))
+    assert with_fit.total[0, 0] / without.total[0, 0] == pytest.approx(np.sqrt(1000 / 640))
+
+
+def test_rows_that_do_not_count_do_not_enter_the_noise():
+    x = a_noise_of([0.6], 5000)
+    use = np.ones(x.shape, dtype=bool)
+    use[1000:1200] = False
+    spoiled = np.where(use, x, 1e3)
+    whole, gap = (noise_from_residuals([v], [use], np.zeros(1)) for v in (x, spoiled))
+    np.testing.assert_array_equal(whole.ar, gap.ar)
+    np.testing.assert_array_equal(whole.level, gap.level)
+
+
+def test_a_joint_that_never_counts_in_a_recording_takes_the_level_of_the_others():
+    x = a_noise_of([0.0], 1000)
+    never, always = np.zeros(x.shape, dtype=bool), np.ones(x.shape, dtype=bool)
+    noise = noise_from_residuals([x, 3.0 * x, x], [always, always, never], np.zeros(1))
+    assert noise.total[2, 0] == pytest.approx(np.median(noise.total[:2, 0]))
+
+
+def test_noise_free_residuals_leave_everything_finite():
+    noise = noise_from_residuals([np.zeros((500, 1))], [np.ones((500, 1), dtype=bool)], np.zeros(1))
+    assert np.isfinite(noise.ar).all() and (noise.level > 0).all() and (noise.total > 0).all()
+
+
+@given(st.lists(st.booleans(), min_size=ORDER + 1, max_size=60))
+@settings(max_examples=50, deadline=None)
+def test_a_row_counts_when_it_and_all_its_lags_do(flags):
+    use = np.array(flags)
+    expected = [i >= ORDER and bool(use[i - ORDER : i + 1].all()) for i in range(len(use))]
+    assert Noise.usable(use).tolist() == expected
