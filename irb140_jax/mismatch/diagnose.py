@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
@@ -73,7 +74,14 @@ def diagnose(
     Raises:
         RecordingError: Too little is left of the recordings after conditioning.
     """
-    config = config or DiagnoseConfig()
+    # Thousands of small solves: a second BLAS thread costs more in waking up than it does.
+    with threadpool_limits(1, "blas"):
+        return _diagnosed(robot, recordings, config or DiagnoseConfig(), progress)
+
+
+def _diagnosed(
+    robot: Robot, recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None]
+) -> Result:
     progress("smoothing and differentiating the positions")
     band = choose_band(list(recordings), robot)
     smooth = [condition(r, band) for r in recordings]

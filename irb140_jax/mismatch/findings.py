@@ -227,7 +227,8 @@ def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any
     best: dict[tuple[str, tuple[int, ...]], float] = {}
     for c, gain in zip(ex.data.candidates, chi, strict=True):
         best[c.slug, c.joints] = max(best.get((c.slug, c.joints), -np.inf), float(gain))
-    for (slug, joints), gain in sorted(best.items(), key=lambda item: -item[1])[:most]:
+    possible = [(key, gain) for key, gain in best.items() if np.isfinite(gain)]
+    for (slug, joints), gain in sorted(possible, key=lambda item: -item[1])[:most]:
         rows.append({
             "effect": slug, "joints": [robot.joint_names[j] for j in joints], "delta_bic": 2.0 * gain,
             "probability": 1.0 if (slug, joints) in chosen else 0.0, "chosen": (slug, joints) in chosen,
