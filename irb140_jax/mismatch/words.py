@@ -117,7 +117,9 @@ def summary(
     said += [i["sentence"] for i in inertials if i["sentence"] and "beyond" in i["sentence"]]
     if rest and kind != "unexplained":
         said.append(f"Something without a name is left on {_listed([robot.joint_names[u.joint] for u in rest])}.")
-    worst = max(fit, key=lambda j: fit[j]["rmse_nominal"] / max(fit[j]["noise_floor"], 1e-12))
+    concerned = [j for f in found for j in f["joints"]] or list(fit)
+    before = "rmse_refit" if found else "rmse_nominal"
+    worst = max(concerned, key=lambda j: fit[j][before] / max(fit[j]["noise_floor"], 1e-12))
     f = fit[worst]
     unit = "N" if robot.is_slide[robot.joint_names.index(worst)] else "N m"
     said.append(
