@@ -79,7 +79,9 @@ def test_logged_torque_beyond_the_rigid_arm_is_the_hidden_law(effect):
         q, v, a = log.q[:, 1], log.qd[:, 1], log.qdd[:, 1]
         left_out = beyond_rigid(case, k)
         law = LAWS[effect](told(case), log.t, q, v, a, log.tau[:, 1] - left_out[:, 1])
-        moving = np.abs(v) > STUCK
+        # The step in which a joint turns round sticks for part of its time, and holds any force within the law's.
+        turning = np.convolve(np.abs(np.diff(np.sign(v), append=v[-1])) > 0, np.ones(3), mode="same") > 0
+        moving = (np.abs(v) > STUCK) & ~turning
         # Speed changes during a step (half of it for damping, which MuJoCo takes at the step's end): a few per mil.
         error = (left_out[:, 1] - law)[moving]
         assert np.sqrt(np.mean(error**2)) < 0.01 * np.sqrt(np.mean(law[moving] ** 2))
