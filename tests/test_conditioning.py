@@ -1,0 +1,264 @@
+"""Smoothing, differentiation and bandwidth: known motions come out as they are, whatever the log did to them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from helpers import random_robot
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from irb140_jax import dynamics
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.errors import InputError
+from irb140_jax.mismatch.model import CorrectedModel, Named, predict
+from irb140_jax.recordings.condition import Band, choose_band, condition
+from irb140_jax.recordings.recording import Recording
+
+BAND = Band(torque=15.0, position=24.0, rate=200.0, step=5)
+RATE = 500.0  # Hz of the logs
+
+
+def times(duration=8.0, rate=RATE):
+    return np.arange(round(duration * rate)) / rate
+
+
+def logged(t, q, tau=None):
+    """A recording of one joint."""
+    q = np.asarray(q).reshape(len(t), 1)
+    return Recording(t, q, np.zeros_like(q) if tau is None else np.asarray(tau).reshape(len(t), 1), ("joint1",))
+
+
+def wave(t, frequency=1.0):
+    """Position, speed and acceleration of a sine of amplitude 1."""
+    w = 2.0 * np.pi * frequency
+    return np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+
+
+def worst(estimate, truth, rows: np.ndarray | bool = True):
+    """Largest error in some rows, as a share of the largest true value."""
+    return np.max(np.where(rows, np.abs(estimate - truth), 0.0)) / np.max(np.abs(truth))
+
+
+@pytest.mark.parametrize("frequency", [0.2, 1.0, 4.0])
+@pytest.mark.parametrize("rate", [125.0, 500.0, 1000.0])
+def test_derivatives_of_sines_well_inside_the_band_are_right_to_a_hundredth(frequency, rate):
+    t = times(rate=rate)
+    r = condition(logged(t, wave(t, frequency)[0]), BAND)
+    # Ripple of the window's pass band, and linear interpolation onto the grid; more where it is differentiated twice.
+    for estimate, truth, ripple in zip((r.q, r.qd, r.qdd), wave(r.t, frequency), (1e-3, 4e-3, 1.3e-2), strict=True):
+        linear = (2.0 * np.pi * frequency / rate) ** 2 / 8.0
+        assert worst(estimate[:, 0], truth) < ripple + linear
+
+
+def test_derivatives_of_parabolas_are_exact():
+    t = times()
+    r = condition(logged(t, 0.3 - 0.7 * t + 0.45 * t**2), BAND)
+    # At the log's own samples, where nothing is interpolated: rounding, differentiated twice.
+    at_samples = np.isclose((r.t * RATE) % 1.0, 0.0, atol=1e-6) | np.isclose((r.t * RATE) % 1.0, 1.0, atol=1e-6)
+    assert at_samples.sum() > 100
+    np.testing.assert_allclose(r.qd[at_samples, 0], (-0.7 + 0.9 * r.t)[at_samples], atol=1e-9)
+    np.testing.assert_allclose(r.qdd[at_samples, 0], 0.9, atol=1e-7)
+
+
+def test_ends_that_the_smoother_cannot_fill_are_left_out_unless_padded():
+    t = times()
+    recording = logged(t, wave(t)[0])
+    inside, padded = condition(recording, BAND), condition(recording, BAND, pad=True)
+    assert inside.t[0] > t[0] and inside.t[-1] < t[-1]
+    assert padded.t[0] == t[0] and padded.t[-1] >= t[-1] - 1.0 / BAND.rate
+    assert np.isfinite(padded.qdd).all()
+
+
+def test_jittered_time_costs_little_accuracy():
+    t = times()
+    t = t + np.random.default_rng(0).uniform(-0.3, 0.3, len(t)) / RATE
+    r = condition(logged(t, wave(t)[0]), BAND)
+    q, qd, qdd = wave(r.t)
+    # Cubic interpolation between the samples.
+    assert worst(r.qd[:, 0], qd) < 3e-3 and worst(r.qdd[:, 0], qdd) < 1e-2
+    assert worst(r.q[:, 0], q) < 1e-3
+
+
+def test_two_alternating_time_steps_cost_little_accuracy():
+    t = np.cumsum(np.where(np.arange(1000) % 2, 0.008, 0.012))
+    r = condition(logged(t, wave(t)[0]), BAND)
+    assert worst(r.qd[:, 0], wave(r.t)[1]) < 5e-3 and worst(r.qdd[:, 0], wave(r.t)[2]) < 2e-2
+
+
+def test_lost_samples_do_not_count_and_the_rest_stays_accurate():
+    t = times()
+    lost = (t > 3.0) & (t < 3.1)
+    r = condition(logged(t[~lost], wave(t)[0][~lost]), BAND)
+    in_gap = (r.t > 3.01) & (r.t < 3.09)
+    assert not r.usable[in_gap].any()
+    far = np.abs(r.t - 3.05) > 0.5
+    assert r.usable[far].mean() > 0.9
+    assert worst(r.qdd[:, 0], wave(r.t)[2], far) < 1e-2
+
+
+def test_single_lost_samples_are_bridged():
+    t = times()
+    kept = np.random.default_rng(1).random(len(t)) > 0.03
+    kept[[0, -1]] = True
+    r = condition(logged(t[kept], wave(t)[0][kept]), BAND)
+    assert r.usable.mean() > 0.9
+    assert worst(r.qdd[:, 0], wave(r.t)[2]) < 1e-2
+
+
+def test_quantised_positions_give_speeds_far_better_than_their_steps():
+    t, step = times(), 1e-3
+    q, _, _ = wave(t, 0.5)
+    r = condition(logged(t, step * np.round(q / step)), BAND)
+    naive = np.max(np.abs(np.diff(step * np.round(q / step)) * RATE - np.diff(q) * RATE))
+    # White rounding noise step/sqrt(12) through the differentiator: a few hundredths of what differences make.
+    assert np.max(np.abs(r.qd[:, 0] - wave(r.t, 0.5)[1])) < 0.1 * naive
+
+
+def test_resting_speed_is_three_deviations_of_what_encoder_noise_makes():
+    t, rng = times(20.0), np.random.default_rng(2)
+    q = 0.2 * wave(t, 0.3)[0]
+    r = condition(logged(t, q + 2e-4 * rng.normal(size=len(t))), BAND)
+    error = np.std(r.qd[:, 0] - 0.2 * wave(r.t, 0.3)[1])
+    # The median of third differences knows the noise to a few per cent.
+    assert r.rest_speed[0] == pytest.approx(3.0 * error, rel=0.15)
+
+
+def test_a_joint_at_rest_does_not_count_and_a_moving_one_does():
+    t = times()
+    q = np.where(t < 4.0, 0.0, 0.5 * (t - 4.0) ** 2)
+    r = condition(logged(t, q), BAND)
+    assert not r.usable[r.t < 3.5].any()
+    assert r.usable[r.t > 4.5].all()
+
+
+def test_a_reversal_is_no_rest():
+    t = times()
+    r = condition(logged(t, wave(t)[0]), BAND)
+    assert r.usable.all()
+
+
+def test_spikes_are_taken_off_the_torque_and_told():
+    t, rng = times(), np.random.default_rng(3)
+    clean = 5.0 * np.sin(3.0 * t) + 0.05 * rng.normal(size=len(t))
+    spiked = clean.copy()
+    spiked[rng.choice(len(t), 12, replace=False)] += 100.0
+    with_spikes, without = (condition(logged(t, wave(t)[0], tau), BAND) for tau in (spiked, clean))
+    # Local medians instead of 12 samples, of a slope of 0.03 a sample and noise of 0.05.
+    assert np.max(np.abs(with_spikes.tau - without.tau)) < 0.3
+    assert "12 torque spikes" in with_spikes.notes[-1] and not without.notes
+
+
+def test_steps_and_flat_tops_of_the_torque_are_no_spikes():
+    t = times()
+    square = np.sign(np.sin(2.0 * np.pi * t)) + 0.02 * np.random.default_rng(4).normal(size=len(t))
+    assert condition(logged(t, wave(t)[0], square), BAND).notes == ()
+
+
+def test_notes_of_the_recording_are_kept():
+    recording = dataclasses.replace(logged(times(), wave(times())[0]), notes=("joint1 was in degrees",))
+    assert condition(recording, BAND).notes == ("joint1 was in degrees",)
+
+
+@given(
+    torque=st.floats(2.0, 20.0), rate=st.floats(100.0, 400.0), step=st.integers(1, 9), extra=st.integers(0, 400)
+)
+@settings(max_examples=60, deadline=None)
+def test_the_low_pass_keeps_ramps_at_the_samples_that_it_says(torque, rate, step, extra):
+    band = Band(torque, 1.6 * torque, rate, step)
+    length = len(band.low_pass()) + step + extra
+    ramp = np.arange(length, dtype=float)
+    kept = band.kept(length)
+    assert len(kept) == len(band.apply(ramp))
+    # Symmetric taps that add up to 1: a ramp is its own mean, to rounding.
+    np.testing.assert_allclose(band.apply(ramp), kept, rtol=1e-9)
+    np.testing.assert_allclose(band.apply(np.ones((length, 2, 3))), 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("step", [1, 5])
+def test_the_low_pass_is_the_plain_convolution_at_the_kept_samples(step):
+    band = dataclasses.replace(BAND, step=step)
+    x = np.random.default_rng(5).normal(size=(700, 2))
+    whole = np.stack([np.convolve(column, band.low_pass(), mode="same") for column in x.T], axis=1)
+    np.testing.assert_allclose(band.apply(x), whole[band.kept(len(x))], atol=1e-12)
+
+
+def test_the_low_pass_passes_what_is_below_the_cut_off_and_stops_what_is_above():
+    t = times(rate=BAND.rate)
+    size = lambda f: np.sqrt(2.0 * np.mean(BAND.apply(np.sin(2.0 * np.pi * f * t)) ** 2))  # noqa: E731
+    assert size(0.5 * BAND.torque) == pytest.approx(1.0, abs=3e-3)
+    assert size(BAND.torque) == pytest.approx(0.5, abs=0.03)
+    assert size(1.6 * BAND.torque) < 2e-3
+
+
+def test_too_short_a_recording_leaves_nothing():
+    assert BAND.apply(np.ones((10, 2))).shape == (0, 2)
+    assert len(BAND.kept(10)) == 0
+
+
+@pytest.mark.parametrize("rate", [60.0, 125.0, 500.0, 1000.0])
+def test_the_chosen_band_fits_the_recording_and_leaves_no_aliases(rate):
+    robot = random_robot("H", 3)[0]
+    t = times(20.0, rate)
+    q = 0.8 * wave(t, 0.4)[0] + 0.1 * wave(t, 2.0)[0] + 2e-5 * np.random.default_rng(6).normal(size=len(t))
+    recording = dataclasses.replace(logged(t, q), joint_names=robot.joint_names)
+    torque = dynamics.inverse_dynamics_batch(robot, *(x[:, None] for x in (q, *_derivatives(t))))
+    band = choose_band([dataclasses.replace(recording, tau=np.asarray(torque))], robot)
+    assert 0.0 < band.torque <= 20.0 and band.torque < band.position <= 0.5 * rate
+    assert band.rate <= rate + 1e-9
+    assert band.rate / band.step >= 2.0 * band.torque
+    # The low-pass must still do something between its cut-off and half the rate at which samples are kept.
+    assert band.torque > 2.0
+
+
+def _derivatives(t):
+    fast, slow = wave(t, 2.0), wave(t, 0.4)
+    return [0.8 * a + 0.1 * b for a, b in zip(slow[1:], fast[1:], strict=True)]
+
+
+def corrected_model(robot, *named):
+    phi = np.asarray(robot.phi)
+    return CorrectedModel(robot, phi, 1.1 * phi, named, BAND)
+
+
+@pytest.mark.parametrize("rate", [125.0, 500.0])
+def test_predictions_have_one_row_a_row_and_are_right_up_to_the_ends(rate):
+    robot = random_robot("H", 3)[0]
+    t = np.append(times(4.0, rate), 4.0)  # a sine is odd about both ends, as the padding is
+    q, qd, qdd = 0.5 * np.array(wave(t, 0.5))
+    recording = dataclasses.replace(logged(t, q), joint_names=robot.joint_names)
+    named = Named(CATALOGUE["viscous_friction"], (0,), (0,), np.array([2.5]), np.zeros(0))
+    out = predict(corrected_model(robot, named), recording)
+    assert set(out) == {"nominal", "refit", "corrected"} and all(x.shape == q[:, None].shape for x in out.values())
+    motion = [x[:, None] for x in (q, qd, qdd)]
+    nominal = np.asarray(dynamics.inverse_dynamics_batch(robot, *motion))
+    moving = np.abs(qd) > 0.1  # else dry friction is rounded off
+    scale = np.max(np.abs(nominal))
+    # Ripple of the smoother, and interpolation back onto the rows.
+    assert np.max(np.abs(out["nominal"] - nominal)[moving]) < 0.01 * scale
+    np.testing.assert_array_equal(out["refit"], out["nominal"])
+    # The corrected model: heavier by a tenth, and rubbing.
+    rigid = np.asarray(dynamics.regressor_batch(robot, *motion)) @ np.asarray(robot.phi).ravel()
+    expected = nominal + 0.1 * rigid + 2.5 * motion[1]
+    assert np.max(np.abs(out["corrected"] - expected)[moving]) < 0.01 * np.max(np.abs(expected))
+
+
+def test_predictions_follow_the_rows_where_time_jitters_and_samples_are_lost():
+    robot = random_robot("H", 3)[0]
+    t = times(4.0)
+    t = t + np.random.default_rng(7).uniform(-0.2, 0.2, len(t)) / RATE
+    t = t[(t < 2.0) | (t > 2.05)]
+    recording = dataclasses.replace(logged(t, 0.5 * wave(t, 0.5)[0]), joint_names=robot.joint_names)
+    out = predict(corrected_model(robot), recording)
+    nominal = np.asarray(dynamics.inverse_dynamics_batch(robot, *(0.5 * x[:, None] for x in wave(t, 0.5))))
+    moving = np.abs(wave(t, 0.5)[1]) > 0.2
+    assert out["nominal"].shape == nominal.shape
+    assert np.max(np.abs(out["nominal"] - nominal)[moving]) < 0.02 * np.max(np.abs(nominal))
+
+
+def test_predictions_for_another_robot_are_refused_with_both_lists_of_joints():
+    robot = random_robot("H", 3)[0]
+    t = times(2.0)
+    recording = dataclasses.replace(logged(t, wave(t)[0]), joint_names=("elbow",))
+    with pytest.raises(InputError, match="elbow.*joint1"):
+        predict(corrected_model(robot), recording)
