@@ -3,4 +3,5 @@
 from irb140_jax.effects.base import AbstractEffect as AbstractEffect
 from irb140_jax.effects.base import Motion as Motion
 from irb140_jax.effects.base import Parameter as Parameter
+from irb140_jax.effects.base import RigidBody as RigidBody
 from irb140_jax.effects.base import Scales as Scales

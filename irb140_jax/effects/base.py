@@ -18,14 +18,38 @@ from irb140_jax.robot import Robot
 from irb140_jax.types import Joints, JointSamples, Samples
 
 
+class RigidBody(eqx.Module):
+    """Sensitivities of the nominal rigid body's torque along a motion.
+
+    Attributes:
+        by_gravity: Torque per unit of each component of gravity in base axes [N m s^2/m], shape (T, n, 3).
+        gravity: Size of gravity [m/s^2], shape ().
+        across: Two unit vectors across gravity in base axes, shape (2, 3).
+        last_link: Torque per inertial parameter of the last link, shape (T, n, 10).
+        by_q, by_qd: Derivatives of the torque by joint positions and velocities, shape (T, n, n), torque first.
+        mass: Joint-space mass matrix, links only, shape (T, n, n).
+    """
+
+    by_gravity: Float[Array, "T n 3"]
+    gravity: Float[Array, ""]
+    across: Float[Array, "2 3"]
+    last_link: Float[Array, "T n 10"]
+    by_q: Float[Array, "T n n"]
+    by_qd: Float[Array, "T n n"]
+    mass: Float[Array, "T n n"]
+
+
 class Motion(eqx.Module):
     """What an effect may look at: a motion and the torque the model transmits along it.
 
     Attributes:
-        t: Time [s], shape (T,).
+        t: Time since the recording began [s], shape (T,).
         q, qd, qdd: Joint positions, velocities, accelerations, shape (T, n).
         load: Torque the transmissions carry: rigid body and all but friction [N m or N], shape (T, n).
         total: Torque the motors give: load and friction [N m or N], shape (T, n).
+        load_rate, load_curve: First and second time derivative of the load, shape (T, n).
+        total_rate: Time derivative of the total torque, shape (T, n).
+        rigid: What the rigid body does along the motion.
         rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
     """
 
@@ -35,6 +59,10 @@ class Motion(eqx.Module):
     qdd: JointSamples
     load: JointSamples
     total: JointSamples
+    load_rate: JointSamples
+    load_curve: JointSamples
+    total_rate: JointSamples
+    rigid: "RigidBody"
     rest_speed: Joints
 
     def direction(self) -> JointSamples:
@@ -48,6 +76,9 @@ class Scales(NamedTuple):
     speed: np.ndarray  # largest speed of each joint [rad/s or m/s]
     rest_speed: np.ndarray  # speed the encoders can't tell from rest
     torque: np.ndarray  # RMS of the logged torque [N m or N]
+    low: np.ndarray  # lowest and highest position [rad or m]
+    high: np.ndarray
+    duration: float  # of the longest recording [s]
 
 
 class Parameter(NamedTuple):
@@ -71,8 +102,11 @@ class AbstractEffect(abc.ABC):
         variants: Subsets of the columns that make sense by themselves.
         confused_with: Slug of a look-alike -> the motion which separates the two.
         needs: The motion that would show the effect.
-        dissipative: It can only take energy out of the arm.
+        friction: It rubs inside the transmission, so it is no part of the load that the transmission carries.
+        dissipative: It can only take energy out of the arm, at every instant.
         mjcf: How MJCF expresses it, or None.
+        everywhere: Its columns fill the rows of all joints, not only of those it is named after.
+        scouts: Its grid of shapes is looked for in the residual (see `scout`).
     """
 
     slug: ClassVar[str]
@@ -84,8 +118,11 @@ class AbstractEffect(abc.ABC):
     variants: ClassVar[tuple[tuple[int, ...], ...]]
     confused_with: ClassVar[dict[str, str]] = {}
     needs: ClassVar[str]
+    friction: ClassVar[bool] = False
     dissipative: ClassVar[bool] = False
     mjcf: ClassVar[str | None] = None
+    everywhere: ClassVar[bool] = False
+    scouts: ClassVar[bool] = False
 
     def sites(self, robot: Robot) -> np.ndarray:
         """Groups of joints at which the effect can act, shape (sites, joints per site); by default each joint alone."""
@@ -100,9 +137,30 @@ class AbstractEffect(abc.ABC):
         """Whether the shape is continuous, so that the best grid point should be refined."""
         return False
 
+    def finer(self, grid: np.ndarray, best: np.ndarray) -> np.ndarray:
+        """As many grid points as before, between the neighbours of the best one (one parameter, equal ratios)."""
+        values = np.sort(grid[:, 0])
+        at = int(np.argmin(np.abs(values - best[0])))
+        return np.geomspace(values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)], len(values))[:, None]
+
+    def scout(self, q: np.ndarray, residual: np.ndarray, scales: Scales, joints: np.ndarray) -> np.ndarray | None:
+        """Grid of shapes suggested by what is left at a joint, or None.
+
+        Args:
+            q: Positions of the joint [rad or m], shape (R,).
+            residual: Whitened residual there, shape (R,).
+            scales: Sizes of the recordings.
+            joints: The site.
+        """
+        del q, residual, scales, joints
+        return None
+
     @abc.abstractmethod
     def columns(self, motion: Motion, joints: Int[Array, " m"], shape: Float[Array, " s"]) -> Float[Array, "T m k"]:
-        """Torque on each joint of the site per unit of each amplitude, shape (T, joints of the site, amplitudes)."""
+        """Torque on each joint of the site per unit of each amplitude, shape (T, joints of the site, amplitudes).
+
+        All n joints instead of those of the site where the effect is `everywhere`.
+        """
 
     @abc.abstractmethod
     def physical(self, w: Float[Array, " k"], shape: Float[Array, " s"]) -> Float[Array, " p"]:

@@ -23,6 +23,7 @@ class LoadDependentFriction(AbstractEffect):
         "torque_gain": "the same loads while standing still",
     }
     needs = "motion in both directions under clearly different loads"
+    friction = True
     dissipative = True
 
     def columns(self, motion, joints, shape):

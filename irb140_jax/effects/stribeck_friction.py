@@ -27,6 +27,7 @@ class StribeckFriction(AbstractEffect):
         "presliding_hysteresis": "micro-motion: presliding is springy before slip",
     }
     needs = "slow motion: constant speeds below and above the Stribeck speed"
+    friction = True
     dissipative = True
 
     def shapes(self, scales, joints):

@@ -17,6 +17,7 @@ class TransmissionCoupling(AbstractEffect):
     variants = ((0,), (0, 1))
     confused_with = {"viscous_friction": "move each of the two joints with the other at rest"}
     needs = "the two joints moving at speeds that are not in proportion"
+    friction = True
     dissipative = True
 
     def sites(self, robot):

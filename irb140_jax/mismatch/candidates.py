@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax import dynamics
-from irb140_jax.effects import AbstractEffect, Motion, Scales
+from irb140_jax.effects import AbstractEffect, Motion, RigidBody, Scales
 from irb140_jax.recordings.condition import Band, Conditioned
 from irb140_jax.robot import Robot
 
@@ -95,10 +95,14 @@ def scales_of(recordings: Sequence[Conditioned]) -> Scales:
         speed=np.max([np.abs(r.qd).max(axis=0) for r in recordings], axis=0),
         rest_speed=np.max([r.rest_speed for r in recordings], axis=0),
         torque=np.sqrt(np.mean(np.concatenate([r.tau for r in recordings]) ** 2, axis=0)) + 1e-12,
+        low=np.min([r.q.min(axis=0) for r in recordings], axis=0),
+        high=np.max([r.q.max(axis=0) for r in recordings], axis=0),
+        duration=max(float(r.t[-1] - r.t[0]) for r in recordings),
     )
 
 
 Loads = tuple[np.ndarray, np.ndarray]  # torque the transmissions carry and torque the motors give, each (T, n)
+STEP = 1e-5  # of the differences behind sensitivities [rad, rad/s, m ...]: errors of 1e-9 beside 1e-10 of rounding
 
 
 class Columns(NamedTuple):
@@ -115,55 +119,103 @@ class Columns(NamedTuple):
     effects: np.ndarray
 
 
-def columns_along(lib: Library, recording: Conditioned, loads: Loads | None = None) -> Columns:
+class Prepared(NamedTuple):
+    """A conditioned recording with what the nominal rigid body does along it; the same in every round.
+
+    Attributes:
+        recording: T samples.
+        Y: Regressor, shape (T, n, 10 n).
+        nominal: Torque of the nominal model, shape (T, n).
+        rigid: Sensitivities, arrays of T samples.
+    """
+
+    recording: Conditioned
+    Y: np.ndarray
+    nominal: np.ndarray
+    rigid: RigidBody
+
+
+def prepared(robot: Robot, recording: Conditioned) -> Prepared:
+    """Evaluate the rigid body along a recording."""
+    q, qd, qdd = (jnp.asarray(x) for x in (recording.q, recording.qd, recording.qdd))
+    Y = np.asarray(dynamics.regressor_batch(robot, q, qd, qdd))
+    parts = lambda r: (r.armature, r.damping, r.frictionloss, r.stiffness)  # noqa: E731
+    bare = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 4)
+    torque = lambda r, *x: np.asarray(dynamics.inverse_dynamics_batch(r, *x))  # noqa: E731
+    rest = torque(bare, q, qd, qdd)
+    weightless = eqx.tree_at(lambda r: r.gravity, bare, jnp.zeros(3))
+    still = (q, 0.0 * qd, 0.0 * qdd)
+    by_gravity = np.stack(
+        [torque(eqx.tree_at(lambda r: r.gravity, bare, jnp.eye(3)[k]), *still) for k in range(3)], axis=-1
+    )
+    unit = jnp.eye(robot.n)
+    by_q = np.stack([(torque(bare, q + STEP * e, qd, qdd) - rest) / STEP for e in unit], axis=-1)
+    by_qd = np.stack([(torque(bare, q, qd + STEP * e, qdd) - rest) / STEP for e in unit], axis=-1)
+    mass = np.stack([torque(weightless, q, 0.0 * qd, 0.0 * qdd + e) for e in unit], axis=-1)
+    g = np.asarray(robot.gravity)
+    size = float(np.linalg.norm(g))
+    down = g / size if size > 0 else np.array([0.0, 0.0, -1.0])
+    first = np.cross(down, np.eye(3)[int(np.argmin(np.abs(down)))])
+    first /= np.linalg.norm(first)
+    across = np.stack([first, np.cross(down, first)])
+    arrays = (by_gravity, np.array(size), across, Y[..., -10:], by_q, by_qd, mass)
+    rigid = RigidBody(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
+    nominal = Y @ np.asarray(robot.phi).ravel() + np.asarray(robot.armature) * recording.qdd
+    return Prepared(recording, Y, nominal + _passive(robot, recording), rigid)
+
+
+def columns_along(lib: Library, along: Prepared, loads: Loads | None = None) -> Columns:
     """Rigid-body regressor, nominal torque and all candidate columns along a recording.
 
     Args:
         lib: The library.
-        recording: T samples.
+        along: The recording.
         loads: Loads along the recording [N m or N]; the nominal model's where None.
-
     """
-    T, n = recording.q.shape
+    r = along.recording
+    load, total = loads or (along.nominal, along.nominal)
+    dt = float(np.mean(np.diff(r.t)))
+    rate = lambda x: np.gradient(x, dt, axis=0)  # noqa: E731
+    rates = (rate(load), rate(rate(load)), rate(total))
+    arrays = (r.t - r.t[0], r.q, r.qd, r.qdd, load, total, *rates, along.rigid, r.rest_speed)
+    whole = Motion(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
+    per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)
     parts = []
-    for start in range(0, T, CHUNK):
-        piece = [x[start : start + CHUNK] for x in (recording.t, recording.q, recording.qd, recording.qdd)]
-        piece += [piece[1]] * 2 if loads is None else [x[start : start + CHUNK] for x in loads]
-        pad = CHUNK - len(piece[0])
-        piece = [np.pad(x, ((0, pad),) + ((0, 0),) * (x.ndim - 1), mode="edge") for x in piece]
-        t, q, qd, qdd, load, total = piece
-        Y = dynamics.regressor_batch(lib.robot, jnp.asarray(q), jnp.asarray(qd), jnp.asarray(qdd))
-        out = _columns(
-            lib.robot, tuple(b[0] for b in lib.blocks), Y, t, q, qd, qdd, load, total, recording.rest_speed,
-            [b[1] for b in lib.blocks], [b[2] for b in lib.blocks], jnp.asarray(loads is None),
-        )  # fmt: skip
-        parts.append([np.asarray(x)[: CHUNK - pad] for x in (Y, *out)])
-    return Columns(*(np.concatenate(x) for x in zip(*parts, strict=True)))
+    for start in range(0, len(r.t), CHUNK):
+        pad = max(start + CHUNK - len(r.t), 0)
+
+        def piece(x, of_time, start=start, pad=pad):
+            if not of_time:
+                return x
+            return np.pad(x[start : start + CHUNK], ((0, pad),) + ((0, 0),) * (x.ndim - 1), mode="edge")
+
+        motion = jax.tree.map(piece, whole, per_sample)
+        sites, shapes = [b[1] for b in lib.blocks], [b[2] for b in lib.blocks]
+        effects = _columns(tuple(b[0] for b in lib.blocks), motion, sites, shapes)
+        parts.append(np.asarray(effects)[: CHUNK - pad])
+    return Columns(along.Y, along.nominal, np.concatenate(parts))
 
 
-# The regressor is compiled apart: fused into this program, XLA would unroll it once for every use.
+# The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
 @eqx.filter_jit
-def _columns(robot, effects, Y, t, q, qd, qdd, load, total, rest_speed, sites, shapes, of_nominal):
-    passive = jax.vmap(partial(_passive, robot))(q, qd, rest_speed + 0.0 * qd)
-    nominal = Y @ robot.phi.ravel() + robot.armature * qdd + passive
-    # Chosen by value, not by a static flag: both uses share one compiled program.
-    load, total = (jnp.where(of_nominal, nominal, x) for x in (load, total))
-    motion = Motion(t, q, qd, qdd, load, total, rest_speed)
-    rows = []
+def _columns(effects, motion, sites, shapes):
+    T, n = motion.q.shape
+    rows = [jnp.zeros((T, n, 0))]
     for effect, joints, shape in zip(effects, sites, shapes, strict=True):
         joints, shape = jnp.asarray(joints), jnp.asarray(shape)
         per_shape = jax.vmap(partial(effect.columns, motion), in_axes=(None, 0))
         c = jax.vmap(per_shape)(joints, shape)  # (S, G, T, m, k)
-        S, G, T, m, k = c.shape
-        onto = jax.nn.one_hot(joints, robot.n, dtype=c.dtype)  # (S, m, n)
-        rows.append(jnp.einsum("sgtmk,smn->tnsgk", c, onto).reshape(T, robot.n, S * G * k))
-    return nominal, jnp.concatenate([jnp.zeros((*q.shape, 0)), *rows], axis=-1)
+        S, G, _, m, k = c.shape
+        every = jnp.broadcast_to(jnp.eye(n), (S, n, n))
+        onto = every if effect.everywhere else jax.nn.one_hot(joints, n, dtype=c.dtype)
+        rows.append(jnp.einsum("sgtmk,smn->tnsgk", c, onto).reshape(T, n, S * G * k))
+    return jnp.concatenate(rows, axis=-1)
 
 
-def _passive(robot, q, qd, rest_speed):
+def _passive(robot: Robot, r: Conditioned) -> np.ndarray:
     """The model's own friction and springs, with the sign of qd rounded off as in the candidates."""
-    dry = robot.frictionloss * jnp.tanh(qd / rest_speed)
-    return robot.damping * qd + dry + robot.stiffness * (q - robot.springref)
+    dry = np.asarray(robot.frictionloss) * np.tanh(r.qd / r.rest_speed)
+    return np.asarray(robot.damping) * r.qd + dry + np.asarray(robot.stiffness) * (r.q - np.asarray(robot.springref))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -193,9 +245,10 @@ class Stretch:
     qdd: np.ndarray
 
 
-def stretch(lib: Library, recording: Conditioned, index: int, band: Band, loads: Loads | None = None) -> Stretch:
+def stretch(lib: Library, along: Prepared, index: int, band: Band, loads: Loads | None = None) -> Stretch:
     """All columns of a recording through the common low-pass, at the kept samples."""
-    Y, nominal, columns = columns_along(lib, recording, loads)
+    Y, nominal, columns = columns_along(lib, along, loads)
+    recording = along.recording
     kept = band.kept(len(recording.t))
     nominal, tau = band.apply(nominal), band.apply(recording.tau)
     X = np.concatenate([band.apply(Y), band.apply(columns)], axis=-1)

@@ -5,9 +5,19 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.mismatch.assemble import Data, assemble, first_noise, problem
-from irb140_jax.mismatch.candidates import Candidate, Library, Loads, columns_along, library, scales_of, stretch
+from irb140_jax.mismatch.candidates import (
+    Candidate,
+    Library,
+    Loads,
+    Prepared,
+    columns_along,
+    library,
+    prepared,
+    scales_of,
+    stretch,
+)
 from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
 from irb140_jax.mismatch.model import composed
 from irb140_jax.mismatch.name import Problem, search
@@ -73,20 +83,23 @@ def explain(
         progress: Told what is being done.
     """
     factor = inertial_prior_factor(robot, 1.0)
-    lib = library(robot, effects, scales_of(recordings))
+    scales = scales_of(recordings)
+    lib = library(robot, effects, scales)
+    progress("rigid body along the recordings")
+    along = [prepared(robot, r) for r in recordings]
     loads: list[Loads | None] = [None] * len(recordings)
     chosen: tuple[int, ...] = ()
     ex: Explanation | None = None
     for turn in range(PASSES):
         progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn + 1})")
-        rows = [stretch(lib, r, i, band, load) for i, (r, load) in enumerate(zip(recordings, loads, strict=True))]
+        rows = [stretch(lib, r, i, band, load) for i, (r, load) in enumerate(zip(along, loads, strict=True))]
         data = assemble(lib, rows, factor, uncertainty)
         progress(f"searching sets of explanations (round {turn + 1})")
         ex = _settled(lib, data, factor, chosen, ex.noise if ex else None)
         if turn < PASSES - 1:
             post = full_posterior(data, ex.problem, ex.grams, ex.chosen)
-            loads = [_loads(lib, data, post, ex.chosen, factor, r) for r in recordings]
-            lib, chosen = _refined(lib, data, ex.chosen)
+            loads = [_loads(lib, data, post, ex.chosen, factor, r) for r in along]
+            lib, chosen = _refined(lib, ex, scales)
     assert ex is not None, "PASSES is at least one"
     return ex
 
@@ -119,7 +132,7 @@ def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -
     return noise_from_residuals(residuals, [s.use for s in data.stretches], np.full(n, used / n))
 
 
-def _loads(lib: Library, data: Data, post: Posterior, chosen, factor: np.ndarray, r: Conditioned) -> Loads:
+def _loads(lib: Library, data: Data, post: Posterior, chosen, factor: np.ndarray, r: Prepared) -> Loads:
     """Loads of the explained model along a recording."""
     dphi, members, amplitudes = fitted(data, post, chosen, factor)
     torques = composed(columns_along(lib, r), members, amplitudes, dphi, dphi)
@@ -144,16 +157,22 @@ def fitted(
     return dphi, members, amplitudes
 
 
-def _refined(lib: Library, data: Data, chosen: tuple[int, ...]) -> tuple[Library, tuple[int, ...]]:
-    """Put a finer grid of shapes around each chosen one; all else stays, so that nothing is compiled anew."""
-    members = [data.candidates[c] for c in chosen]
+def _refined(lib: Library, ex: Explanation, scales: Scales) -> tuple[Library, tuple[int, ...]]:
+    """Finer grids of shapes around the chosen ones, and grids that the residual suggests.
+
+    Only values change, so that nothing is compiled anew.
+    """
+    members = ex.members
     blocks = []
     for effect, sites, shapes, first in lib.blocks:
         shapes = shapes.copy()
         for s, joints in enumerate(sites):
             mine = [m for m in members if m.slug == effect.slug and m.joints == tuple(joints)]
             if mine and effect.refines():
-                shapes[s] = _finer(shapes[s], mine[0].shape)
+                shapes[s] = effect.finer(shapes[s], mine[0].shape)
+            elif effect.scouts and not mine:
+                suggested = effect.scout(*_left_over(ex, int(joints[0])), scales, joints)
+                shapes[s] = shapes[s] if suggested is None else suggested
         blocks.append((effect, sites, shapes, first))
     candidates = []
     for c in lib.candidates:
@@ -163,15 +182,19 @@ def _refined(lib: Library, data: Data, chosen: tuple[int, ...]) -> tuple[Library
         position = (int(c.columns[0]) - c.variant[0] - block[3]) // width - site * block[2].shape[1]
         candidates.append(dataclasses.replace(c, shape=block[2][site, position]))
     refined = dataclasses.replace(lib, candidates=tuple(candidates), blocks=tuple(blocks))
-    return refined, tuple(_same(c, refined, data) for c in chosen)
+    return refined, tuple(_same(c, refined, ex.data) for c in ex.chosen)
 
 
-def _finer(grid: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """The same number of points between the centre's neighbours (one shape parameter, equal ratios)."""
-    values = np.sort(grid[:, 0])
-    at = int(np.argmin(np.abs(values - centre[0])))
-    low, high = values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)]
-    return np.geomspace(low, high, len(values))[:, None]
+def _left_over(ex: Explanation, joint: int) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of a joint and the residual there, in standard deviations, over all recordings."""
+    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    w = post.mean * ex.data.scale[post.columns]
+    q, residual = [], []
+    for r, s in enumerate(ex.data.stretches):
+        use = s.use[:, joint]
+        q.append(s.q[use, joint])
+        residual.append((s.y[use, joint] - s.X[use, joint][:, post.columns] @ w) / ex.noise.total[r, joint])
+    return np.concatenate(q), np.concatenate(residual)
 
 
 def _same(index: int, lib: Library, data: Data) -> int:

@@ -9,7 +9,7 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.evidence import eliminated, gain_of
+from irb140_jax.mismatch.evidence import eliminated
 from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.name import PREFER, group_odds
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
@@ -79,7 +79,7 @@ def _parameters(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: n
 
 
 def _shape_variance(ex: Explanation, index: int) -> np.ndarray:
-    """Variance of a continuous shape from the curvature of the evidence over its refined grid."""
+    """Variance of continuous shapes from the evidence over their refined grid."""
     c = ex.data.candidates[index]
     if not c.effect.refines():
         return np.zeros(len(c.shape))
@@ -88,25 +88,23 @@ def _shape_variance(ex: Explanation, index: int) -> np.ndarray:
         for i, o in enumerate(ex.data.candidates)
         if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant
     ]
-    gain = ex.problem.scores(ex.problem.without(_others(ex, index)))[alike]
-    x = np.array([float(ex.data.candidates[i].shape[0]) for i in alike])
-    finite = np.isfinite(gain)
-    if finite.sum() < 3:
-        return np.array([np.ptp(x) ** 2])
-    p = np.exp(gain[finite] - gain[finite].max())
-    # The grid is a stretch of a smooth posterior: spacing weights make the sum an integral.
-    p *= np.gradient(x[finite])
+    gain = ex.problem.scores(_others(ex, index), c.joints)[alike]
+    shapes = np.array([ex.data.candidates[i].shape for i in alike])
+    gain = np.where(np.isfinite(gain), gain, -np.inf)
+    if not np.isfinite(gain).any():
+        return np.ptp(shapes, axis=0) ** 2
+    p = np.exp(gain - gain.max())
     p /= p.sum()
-    mean = p @ x[finite]
-    spacing = float(np.min(np.diff(np.sort(x))))
-    return np.array([max(float(p @ (x[finite] - mean) ** 2), spacing**2 / 12.0)])
+    variance = p @ (shapes - p @ shapes) ** 2
+    # A posterior narrower than the grid is known to the grid's spacing.
+    spacing = np.array([np.min(np.diff(np.unique(x)), initial=np.ptp(x) + 1e-12) for x in shapes.T])
+    return np.maximum(variance, spacing**2 / 12.0)
 
 
 def _evidence(ex: Explanation, index: int) -> dict[str, float]:
-    H = ex.problem.without(_others(ex, index))
     columns = ex.data.candidates[index].columns + ex.problem.offset
-    M = H[np.ix_(columns, columns)]
-    drop = float(H[columns, -1] @ np.linalg.lstsq(M, H[columns, -1], rcond=1e-12)[0])
+    H = ex.problem.eliminated_near(_others(ex, index), columns)
+    drop = float(H[:-1, -1] @ np.linalg.lstsq(H[:-1, :-1], H[:-1, -1], rcond=1e-12)[0])
     share, _ = held_out_gain(ex, index)
     return {"delta_bic": drop - len(columns) * float(np.log(ex.grams.rows.sum())), "heldout_gain": share}
 
@@ -114,11 +112,11 @@ def _evidence(ex: Explanation, index: int) -> dict[str, float]:
 def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], float]:
     """Log odds of every effect that could stand in a finding's place, and of none (slug "")."""
     c = ex.data.candidates[index]
-    H = ex.problem.without(_others(ex, index))
-    taken = {(ex.data.candidates[i].slug, ex.data.candidates[i].joints) for i in _others(ex, index)}
+    rest = _others(ex, index)
+    taken = {(ex.data.candidates[i].slug, ex.data.candidates[i].joints) for i in rest}
     odds = {
         key: value
-        for key, value in group_odds(ex.problem, H).items()
+        for key, value in group_odds(ex.problem, rest).items()
         if set(key[1]) & set(c.joints) and key[0] != "inertials" and key not in taken
     }
     guard = ex.problem.guard(ex.chosen)[list(c.joints)].max()
@@ -132,28 +130,26 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
             odds[key] = own + (PREFER * (excess / (guard + PREFER) - 1.0) if excess > 0 else excess - PREFER)
         elif abs(excess) <= guard:
             odds[key] = own  # within what an imperfect law could feign, a rival is as good as the named law
-    for key, value in _pairs(ex, H, c).items():
+    for key, value in _pairs(ex, rest, c).items():
         odds[key] = max(odds.get(key, -np.inf), min(value, own))
     odds["", ()] = 0.0
     return odds
 
 
-def _pairs(ex: Explanation, H: np.ndarray, c: Candidate) -> dict[tuple[str, tuple[int, ...]], float]:
+def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[tuple[str, tuple[int, ...]], float]:
     """Log odds of a special case of the named law together with one more effect, under the latter's name.
 
     The special case (say, Coulomb friction) is so common that it costs no prior odds.
     """
     odds: dict[tuple[str, tuple[int, ...]], float] = {}
-    for special in ex.data.candidates:
+    for i, special in enumerate(ex.data.candidates):
         if special.slug not in c.effect.contains or special.joints != c.joints:
             continue
-        columns = special.columns + ex.problem.offset
-        base = gain_of(H, columns)
-        rest = group_odds(ex.problem, eliminated(H, columns)[0])
-        for (slug, joints), value in rest.items():
+        base = ex.problem.odds(rest, (i,)) - ex.problem.log_prior[i]
+        for (slug, joints), value in group_odds(ex.problem, (*rest, i)).items():
             known = slug == "inertials" or slug in c.effect.contains or slug == c.slug
             if joints == c.joints and not known and special.slug not in CATALOGUE[slug].contains:
-                odds[slug, joints] = base + value
+                odds[slug, joints] = max(odds.get((slug, joints), -np.inf), base + value)
     return odds
 
 
@@ -223,7 +219,7 @@ def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any
     rows = []
     chosen = {(ex.data.candidates[c].slug, ex.data.candidates[c].joints) for c in ex.chosen}
     # Alone: over nothing but the inertials, with the noise of the final model.
-    chi = ex.problem.scores(ex.problem.H) - ex.problem.log_prior
+    chi = ex.problem.scores(()) - ex.problem.log_prior
     best: dict[tuple[str, tuple[int, ...]], float] = {}
     for c, gain in zip(ex.data.candidates, chi, strict=True):
         best[c.slug, c.joints] = max(best.get((c.slug, c.joints), -np.inf), float(gain))

@@ -10,7 +10,7 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.candidates import Candidate, Columns, Library, columns_along
+from irb140_jax.mismatch.candidates import Candidate, Columns, Library, columns_along, prepared
 from irb140_jax.recordings.condition import Band, Conditioned, condition
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
@@ -95,7 +95,7 @@ def composed(
         part = columns[..., c.columns] @ w
         if c.slug == "torque_gain":
             gain += part
-        elif c.effect.dissipative:
+        elif c.effect.friction:
             friction += part
         else:
             load = load + part
@@ -118,11 +118,12 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     nominal_phi = np.asarray(model.robot.phi)
     shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
     amplitudes = [named.amplitudes for named in model.named]
-    torques = composed(columns_along(lib, recording), candidates, amplitudes, *shifts)
+    along = prepared(model.robot, recording)
+    torques = composed(columns_along(lib, along), candidates, amplitudes, *shifts)
     if not model.named:
         return torques
     # Columns that depend on the load see the corrected one, as they did in the fit.
-    return composed(columns_along(lib, recording, (torques.load, torques.total)), candidates, amplitudes, *shifts)
+    return composed(columns_along(lib, along, (torques.load, torques.total)), candidates, amplitudes, *shifts)
 
 
 def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray]:

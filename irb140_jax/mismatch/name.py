@@ -9,13 +9,22 @@ from functools import cached_property
 import numpy as np
 
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.evidence import Layout, eliminated, gain_of, gains, layouts, posterior
+from irb140_jax.mismatch.evidence import Layout, gain_of, gains, layouts, posterior
 
 ACCEPT = np.log(100.0)  # posterior odds a finding needs; under the null, a bound of 1 % on a false one (Markov)
 PREFER = np.log(20.0)  # odds at which a law replaces the simpler one that it contains
 FORM_ERROR = 0.03  # no law is exact: 3 % of what a joint's effects explain is not evidence for another effect
 LEAST_SHARE = 0.005  # an effect below this share of its joint's torque is within what smoothing and geometry feign
 MOST = 40  # effects at most in one set
+
+
+@dataclasses.dataclass(frozen=True)
+class Neighbourhood:
+    """Candidates near some joints: which, their columns in the Gram matrix, and groups numbered within those."""
+
+    which: np.ndarray
+    columns: np.ndarray
+    groups: tuple[Layout, ...]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,10 +55,6 @@ class Problem:
         parts = [self.candidates[c].columns + self.offset for c in chosen]
         return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
 
-    def without(self, chosen: tuple[int, ...]) -> np.ndarray:
-        """Gram matrix with a set eliminated."""
-        return eliminated(self.H, self.columns(chosen))[0]
-
     @cached_property
     def groups(self) -> tuple[Layout, ...]:
         """All candidates, in groups of equal size."""
@@ -63,40 +68,74 @@ class Problem:
             touches[list(c.joints), i] = True
         return touches
 
-    def scores(self, H: np.ndarray, joints: Collection[int] | None = None) -> np.ndarray:
-        """Log posterior odds of adding each candidate; -inf where its amplitudes would be inadmissible.
+    def scores(self, chosen: tuple[int, ...], joints: Collection[int] | None = None) -> np.ndarray:
+        """Log posterior odds of adding each candidate to a set; -inf where its amplitudes would be inadmissible.
 
         Args:
-            H: Gram matrix with the rest of the set eliminated.
-            joints: Only candidates that touch these joints; all by default.
+            chosen: The set.
+            joints: Only candidates that touch these joints, -inf for the rest; all by default.
         """
-        groups = self.groups
-        if joints is not None:
-            near = np.any(self.at_joint[list(joints)], axis=0, keepdims=False).reshape(-1)
-            groups = [Layout(g.which[near[g.which]], g.columns[near[g.which]]) for g in groups if near[g.which].any()]
-        gain, mean = gains(H, groups, len(self.candidates), self.lowest.shape[1])
+        near = self.neighbourhood(frozenset(joints) if joints is not None else None)
+        H = self.eliminated_near(chosen, near.columns)
+        gain, mean = gains(H, near.groups, len(self.candidates), self.lowest.shape[1])
         with np.errstate(invalid="ignore"):
             bad = np.any((mean < self.lowest - 1e-9) | (mean > self.highest + 1e-9), axis=1)
-        return np.where(bad | (self._share(groups, mean) < LEAST_SHARE), -np.inf, gain + self.log_prior)
+        return np.where(bad | (self._share(near.which, mean) < LEAST_SHARE), -np.inf, gain + self.log_prior)
 
-    def _share(self, groups: Collection[Layout], mean: np.ndarray) -> np.ndarray:
+    def eliminated_near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
+        """Gram matrix of some columns and y, with a set eliminated."""
+        index = np.append(columns, self.H.shape[0] - 1)
+        H = self.H[np.ix_(index, index)]
+        c = self.columns(chosen)
+        if len(c) == 0:
+            return H
+        half = np.linalg.solve(np.linalg.cholesky(self.H[np.ix_(c, c)] + np.eye(len(c))), self.H[np.ix_(c, index)])
+        return H - half.T @ half
+
+    def neighbourhood(self, joints: frozenset[int] | None) -> "Neighbourhood":
+        """Candidates that touch some joints, with their columns numbered among themselves."""
+        if joints not in self._neighbourhoods:
+            which = np.arange(len(self.candidates))
+            if joints is not None:
+                which = np.flatnonzero(self.at_joint[sorted(joints)].reshape(len(joints), -1).any(axis=0))
+            columns = np.unique(np.concatenate([self.candidates[i].columns for i in which])) + self.offset
+            number = {int(c): k for k, c in enumerate(columns)}
+            groups: dict[int, list[int]] = defaultdict(list)
+            for i in which:
+                groups[len(self.candidates[i].columns)].append(int(i))
+            self._neighbourhoods[joints] = Neighbourhood(which, columns, tuple(
+                Layout(np.array(m), np.array([[number[int(c + self.offset)] for c in self.candidates[i].columns] for i in m]))
+                for m in groups.values()
+            ))  # fmt: skip
+        return self._neighbourhoods[joints]
+
+    @cached_property
+    def _neighbourhoods(self) -> dict[frozenset[int] | None, "Neighbourhood"]:
+        return {}
+
+    def _share(self, which: np.ndarray, mean: np.ndarray) -> np.ndarray:
         """Torque of each candidate with these amplitudes, as a share of the torque of the joint it matters most to."""
         share = np.zeros(len(self.candidates))
-        for g in groups:
+        for g, G in zip(self.groups, self._own_grams, strict=True):
             k = g.columns.shape[1]
-            G = self.per_joint[:, g.columns[:, :, None], g.columns[:, None, :]]
-            energy = np.einsum("ik,jikl,il->ji", mean[g.which, :k], G, mean[g.which, :k])
+            v = np.nan_to_num(mean[g.which, :k])
+            energy = np.einsum("ik,jikl,il->ji", v, G, v)
             share[g.which] = np.sqrt(np.max(energy / self.torque_energy[:, None], axis=0))
         return share
 
-    def odds(self, H: np.ndarray, chosen: Iterable[int]) -> float:
-        """Log posterior odds of a set against the empty one, given what H has eliminated."""
-        total = 0.0
-        for c in chosen:
-            columns = self.candidates[c].columns + self.offset
-            total += gain_of(H, columns) + self.log_prior[c]
-            H, _ = eliminated(H, columns)
-        return total
+    @cached_property
+    def _own_grams(self) -> list[np.ndarray]:
+        """Gram matrix of each candidate's own columns at each joint, per group, shape (n, members, k, k)."""
+        return [self.per_joint[:, g.columns[:, :, None], g.columns[:, None, :]] for g in self.groups]
+
+    def odds(self, rest: tuple[int, ...], chosen: Iterable[int]) -> float:
+        """Log posterior odds of adding some candidates to a set."""
+        chosen = tuple(chosen)
+        if not chosen:
+            return 0.0
+        columns = self.columns(chosen)
+        H = self.eliminated_near(rest, columns)
+        return gain_of(H, np.arange(len(columns))) + float(sum(self.log_prior[c] for c in chosen))
 
     def guard(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Log odds that imperfect laws could feign at each joint, shape (n,)."""
@@ -134,9 +173,9 @@ def _split(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
         )
         rest = tuple(c for c in chosen if c != d)
         other = _settled(problem, _grown(problem, rest, banned), set(joints), banned)
-        H = problem.without(tuple(set(rest) & set(other)))
-        new, old = (tuple(c for c in s if c not in set(rest) & set(other)) for s in (other, chosen))
-        if problem.odds(H, new) - len(new) * ACCEPT > problem.odds(H, old) - len(old) * ACCEPT:
+        both = tuple(set(rest) & set(other))
+        new, old = (tuple(c for c in s if c not in both) for s in (other, chosen))
+        if problem.odds(both, new) - len(new) * ACCEPT > problem.odds(both, old) - len(old) * ACCEPT:
             return other
     return chosen
 
@@ -145,7 +184,7 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
     """Add the best candidate, settle around it, and again, until none is worth adding."""
     seen: set[frozenset[int]] = set()
     while len(chosen) < MOST:
-        scores = problem.scores(problem.without(chosen)) - _hurdle(problem, chosen) - ACCEPT
+        scores = problem.scores(chosen) - _hurdle(problem, chosen) - ACCEPT
         scores[[*chosen, *banned]] = -np.inf
         scores = np.where(_conflicts(problem, chosen), -np.inf, scores)
         best = int(np.argmax(scores))
@@ -204,8 +243,7 @@ def _exchange(
     for drop in [*((c,) for c in near), *pairs]:
         rest = tuple(c for c in chosen if c not in drop)
         old = [problem.candidates[c] for c in drop]
-        H = problem.without(rest)
-        scores = problem.scores(H, {j for c in old for j in c.joints}) - problem.odds(H, drop)
+        scores = problem.scores(rest, {j for c in old for j in c.joints}) - problem.odds(rest, drop)
         scores[_conflicts(problem, rest)] = -np.inf
         scores[[*drop, *banned]] = -np.inf
         for i in np.flatnonzero(scores > best):
@@ -236,10 +274,9 @@ def _simplify(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) 
         if not special:
             continue
         rest = tuple(x for x in chosen if x != d)
-        H = problem.without(rest)
-        scores = problem.scores(H, member.joints)
+        scores = problem.scores(rest, member.joints)
         best = max(special, key=lambda i: scores[i])
-        if problem.odds(H, (d,)) - scores[best] < PREFER + hurdle[d]:
+        if problem.odds(rest, (d,)) - scores[best] < PREFER + hurdle[d]:
             return (*rest, best)
     return None
 
@@ -249,20 +286,19 @@ def _remove(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) ->
     odds = {}
     for d in near:
         rest = tuple(x for x in chosen if x != d)
-        H = problem.without(rest)
         # The score knows what is admissible: what was so when it entered need not be so beside later members.
-        fits = np.isfinite(problem.scores(H, problem.candidates[d].joints)[d])
-        odds[d] = problem.odds(H, (d,)) - _hurdle(problem, rest)[d] if fits else -np.inf
+        fits = np.isfinite(problem.scores(rest, problem.candidates[d].joints)[d])
+        odds[d] = problem.odds(rest, (d,)) - _hurdle(problem, rest)[d] if fits else -np.inf
     if not odds or min(odds.values()) >= ACCEPT:
         return None
     weakest = min(odds, key=lambda d: odds[d])
     return tuple(x for x in chosen if x != weakest)
 
 
-def group_odds(problem: Problem, H: np.ndarray) -> dict[tuple[str, tuple[int, ...]], float]:
-    """Best log odds of each effect at each site, over its shapes and variants."""
+def group_odds(problem: Problem, chosen: tuple[int, ...]) -> dict[tuple[str, tuple[int, ...]], float]:
+    """Best log odds of adding each effect at each site to a set, over its shapes and variants."""
     odds: dict[tuple[str, tuple[int, ...]], float] = {}
-    for score, c in zip(problem.scores(H), problem.candidates, strict=True):
+    for score, c in zip(problem.scores(chosen), problem.candidates, strict=True):
         key = (c.slug, c.joints)
         odds[key] = max(odds.get(key, -np.inf), float(score))
     return odds

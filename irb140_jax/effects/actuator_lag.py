@@ -1,0 +1,38 @@
+"""Actuator lag: the real torque follows the logged one with a delay of first order."""
+
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+
+
+class ActuatorLag(AbstractEffect):
+    """T d(real)/dt + real = logged, so the log holds T d(tau)/dt beyond the model."""
+
+    slug = "actuator_lag"
+    title = "a drive that lags behind its log"
+    equation = "T d tau/dt"
+    source = "Khalil and Dombre, Modeling, Identification and Control of Robots, 2002"
+    parameters = (Parameter("time_constant", "s", low=0.0),)
+    variants = ((0,),)
+    confused_with = {
+        "time_delay": "a delay acts on all joints alike",
+        "joint_elasticity": "a chirp through the first resonance",
+        "viscous_friction": "two excitation frequencies: the phase of a lag grows with frequency",
+    }
+    needs = "fast changes of this joint's torque"
+
+    def columns(self, motion, joints, shape):
+        return of_site(motion.total_rate, joints)[:, :, None]
+
+    def physical(self, w, shape):
+        return w
+
+    def amplitudes(self, values):
+        return np.array([values["time_constant"]]), np.zeros(0)
+
+    def lowest(self, robot, joints):
+        return np.zeros(1)
+
+    def where(self, names, values, units):
+        late = f"{1e3 * values['time_constant']:.3g} ms"
+        return f"{names}: whenever the torque changes; the real torque comes {late} late"

@@ -1,0 +1,37 @@
+"""Encoder offset: a joint's zero is wrong."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter
+
+
+class EncoderOffset(AbstractEffect):
+    """q_logged = q + offset: tau(q_logged - offset) - tau(q_logged), to first order, on every joint."""
+
+    slug = "encoder_offset"
+    title = "a wrong zero of an encoder"
+    equation = "-offset d tau/d q_j"
+    source = "Hollerbach, Khalil, Gautier, Springer Handbook of Robotics, 2016, ch. 6"
+    parameters = (Parameter("offset", "{q}"),)
+    variants = ((0,),)
+    confused_with = {
+        "torque_offset": "postures in which the slope of gravity changes sign",
+        "gravity_tilt": "a sweep of the first joint",
+        "gravity_spring": "the whole range of the joint: a spring is linear in position, gravity is not",
+    }
+    needs = "postures in which the slope of gravity over this joint changes sign; or its zero mark"
+    everywhere = True
+
+    def columns(self, motion, joints, shape):
+        return -jnp.take(motion.rigid.by_q, joints, axis=2)
+
+    def physical(self, w, shape):
+        return w
+
+    def amplitudes(self, values):
+        return np.array([values["offset"]]), np.zeros(0)
+
+    def where(self, names, values, units):
+        offset = f"{values['offset']:.3g} {units['offset']}"
+        return f"{names}: along the slope of gravity and inertia over this joint; its zero is off by {offset}"

@@ -1,0 +1,40 @@
+"""Gravity spring: a counterbalance, cable or dress pack that pulls the joint towards a rest position."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+
+
+class GravitySpring(AbstractEffect):
+    """tau = k (q - rest)."""
+
+    slug = "gravity_spring"
+    title = "a spring between two links"
+    equation = "k (q - rest)"
+    source = "Khalil and Dombre 2002, ch. 9"
+    parameters = (Parameter("stiffness", "{tau}/{q}"), Parameter("rest", "{q}"))
+    contains = ("torque_offset",)
+    variants = ((0, 1),)
+    confused_with = {
+        "torque_offset": "the whole range of the joint",
+        "encoder_offset": "the whole range of the joint: a spring is linear in position, gravity is not",
+    }
+    needs = "the whole range of the joint, in several postures of the others"
+    mjcf = "joint stiffness and springref"
+
+    def columns(self, motion, joints, shape):
+        q = of_site(motion.q, joints)
+        return jnp.stack([q, jnp.ones_like(q)], axis=-1)
+
+    def physical(self, w, shape):
+        return jnp.stack([w[0], -w[1] / jnp.where(w[0] == 0.0, 1.0, w[0])])
+
+    def amplitudes(self, values):
+        return values["stiffness"] * np.array([1.0, -values["rest"]]), np.zeros(0)
+
+    def where(self, names, values, units):
+        return (
+            f"{names}: {values['stiffness']:.3g} {units['stiffness']} away from {values['rest']:.3g} {units['rest']}, "
+            "at any speed"
+        )

@@ -1,0 +1,39 @@
+"""Gravity tilt: the base is not level."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter
+
+
+class GravityTilt(AbstractEffect):
+    """Torque of a gravity vector that leans: tau_g(g + g tilt e), e across gravity, in two components."""
+
+    slug = "gravity_tilt"
+    title = "a base that is not level"
+    equation = "d g(q)/d gravity . g tilt e"
+    source = "Siciliano et al., Robotics, 2009, ch. 7, gravity in base axes"
+    parameters = (Parameter("tilt", "rad", low=0.0),)
+    variants = ((0, 1),)
+    confused_with = {
+        "payload": "the same poses with and without a known mass",
+        "encoder_offset": "a sweep of the first joint",
+    }
+    needs = "postures whose gravity torques don't all scale together, with the first joint swept"
+    everywhere = True
+
+    def sites(self, robot):
+        return np.arange(robot.n)[None, :]
+
+    def columns(self, motion, joints, shape):
+        return jnp.einsum("tng,kg->tnk", motion.rigid.by_gravity, motion.rigid.gravity * motion.rigid.across)
+
+    def physical(self, w, shape):
+        return jnp.hypot(w[0], w[1])[None]
+
+    def amplitudes(self, values):
+        direction = values.get("direction", 0.0)
+        return values["tilt"] * np.array([np.cos(direction), np.sin(direction)]), np.zeros(0)
+
+    def where(self, names, values, units):
+        return f"all joints under gravity, at rest too: the base leans by {np.degrees(values['tilt']):.3g} deg"

@@ -1,0 +1,59 @@
+"""Presliding hysteresis: bristles that bend like springs before they slip."""
+
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, geometric_grid, of_site
+
+
+class PreslidingHysteresis(AbstractEffect):
+    """Dahl: tau = Fc z, dz = (stiffness/Fc) dq (1 - z sign(dq)).
+
+    Over a step dq in one direction z goes towards sign(dq) by the factor exp(-|dq|/d), d = Fc/stiffness: a linear
+    recurrence, which an associative scan solves exactly.
+    """
+
+    slug = "presliding_hysteresis"
+    title = "friction that is springy before it slips"
+    equation = "Fc z, dz/dt = (stiffness/Fc) qd (1 - z sign(qd))"
+    source = "P. R. Dahl, A solid friction model, Aerospace Corp. TOR-0158, 1968"
+    parameters = (Parameter("coulomb", "{tau}", low=0.0), Parameter("stiffness", "{tau}/{q}", low=0.0))
+    contains = ("coulomb_friction",)
+    variants = ((0,),)
+    confused_with = {
+        "backlash": "reversals under different preload",
+        "stribeck_friction": "micro-motion: presliding is springy before slip",
+        "coulomb_friction": "micro-motion around a reversal",
+    }
+    needs = "micro-motion: slow reversals in which the joint turns less than a degree"
+    friction = True
+
+    def shapes(self, scales, joints):
+        span = max(float(scales.high[joints[0]] - scales.low[joints[0]]), 1e-9)
+        return geometric_grid(0.0015 * span, 0.05 * span, 7)
+
+    def refines(self):
+        return True
+
+    def columns(self, motion, joints, shape):
+        q = of_site(motion.q, joints)
+        dq = jnp.diff(q, axis=0, prepend=q[:1])
+        keep = jnp.exp(-jnp.abs(dq) / shape[0])
+        _, z = lax.associative_scan(lambda a, b: (a[0] * b[0], a[1] * b[0] + b[1]), (keep, jnp.sign(dq) * (1.0 - keep)))
+        return z[:, :, None]
+
+    def physical(self, w, shape):
+        return jnp.stack([w[0], w[0] / shape[0]])
+
+    def amplitudes(self, values):
+        return np.array([values["coulomb"]]), np.array([values["coulomb"] / values["stiffness"]])
+
+    def lowest(self, robot, joints):
+        return np.zeros(1)
+
+    def where(self, names, values, units):
+        return (
+            f"{names}: after each reversal friction rises to {values['coulomb']:.3g} {units['coulomb']} like a spring "
+            f"of {values['stiffness']:.3g} {units['stiffness']}"
+        )

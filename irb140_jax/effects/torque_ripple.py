@@ -1,0 +1,70 @@
+"""Torque ripple: cogging of the motor or the mesh of the gear, periodic in position."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+
+POINTS = 10  # cycle numbers in the search at once
+OVERSAMPLING = 4  # points per resolvable line of the spectrum over position
+
+
+class TorqueRipple(AbstractEffect):
+    """tau = A sin(2 pi n q + phase), in a sine and a cosine."""
+
+    slug = "torque_ripple"
+    title = "torque ripple"
+    equation = "A sin(2 pi n q + phase)"
+    source = "Holtz and Springob, IEEE Trans. Ind. Electronics 43(2), 1996"
+    parameters = (Parameter("amplitude", "{tau}", low=0.0), Parameter("cycles_per_rad", "1/{q}", low=0.0))
+    variants = ((0, 1),)
+    confused_with = {
+        "position_dependent_friction": "the same stretch in both directions: friction changes sign, ripple does not"
+    }
+    needs = "slow motion through the whole range of the joint"
+    scouts = True
+
+    def shapes(self, scales, joints):
+        return np.geomspace(1.0, 30.0, POINTS)[:, None] / self._span(scales, joints)
+
+    def refines(self):
+        return True
+
+    def finer(self, grid, best):
+        # Neighbouring cycle numbers are one line of the spectrum apart at first, a tenth of it after each round.
+        values = np.sort(np.unique(grid[:, 0]))
+        step = np.min(np.diff(values)) if len(values) > 1 else 0.1 * best[0]
+        return np.maximum(best[0] + min(step, 0.2 * best[0]) * np.linspace(-1.0, 1.0, POINTS), 1e-6)[:, None]
+
+    def scout(self, q, residual, scales, joints):
+        span = self._span(scales, joints)
+        step = 1.0 / (OVERSAMPLING * span)
+        # As many cycles as the samples can resolve where the joint is fastest.
+        n = np.arange(0.8 / span, min(400 * step, len(q) / (4 * span)), step)
+        if len(q) < 50 or len(n) < 5:
+            return None
+        phase = 2j * np.pi * n[None, :] * q[:, None]
+        power = np.abs(np.exp(-phase).T @ (residual - residual.mean())) ** 2
+        best = n[np.argmax(power)]
+        return (best + step * np.linspace(-1.0, 1.0, POINTS))[:, None]
+
+    @staticmethod
+    def _span(scales, joints):
+        return max(float(scales.high[joints[0]] - scales.low[joints[0]]), 1e-9)
+
+    def columns(self, motion, joints, shape):
+        angle = 2.0 * jnp.pi * shape[0] * of_site(motion.q, joints)
+        return jnp.stack([jnp.sin(angle), jnp.cos(angle)], axis=-1)
+
+    def physical(self, w, shape):
+        return jnp.stack([jnp.hypot(w[0], w[1]), shape[0]])
+
+    def amplitudes(self, values):
+        phase = values.get("phase", 0.0)
+        return values["amplitude"] * np.array([np.cos(phase), np.sin(phase)]), np.array([values["cycles_per_rad"]])
+
+    def where(self, names, values, units):
+        return (
+            f"{names}: {values['amplitude']:.3g} {units['amplitude']} that repeat every "
+            f"{1 / values['cycles_per_rad']:.3g} {units['cycles_per_rad'][2:]} of position"
+        )
