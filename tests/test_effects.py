@@ -1,6 +1,7 @@
 """What every effect of the catalogue must keep: its formula, its units, its bounds, and the laws of physics."""
 
 import re
+import sys
 from functools import partial
 
 import equinox as eqx
@@ -363,21 +364,31 @@ def test_a_model_corrected_by_effects_of_zero_strength_predicts_the_nominal_torq
     assert np.array_equal(out["corrected"], out["nominal"]) and np.array_equal(out["refit"], out["nominal"])
 
 
-def test_two_effects_of_one_slug_are_refused_by_name(tmp_path, monkeypatch):
-    source = (
+@pytest.fixture
+def another_file(tmp_path, monkeypatch):
+    """Puts a file with this source into the folder of the effects, until the test is over."""
+    def put(source: str) -> None:
+        (tmp_path / "zz_another.py").write_text(source, encoding="utf-8")
+        monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+
+    yield put
+    # Importing made it known to Python and to the package; the next test finds neither.
+    sys.modules.pop("irb140_jax.effects.zz_another", None)
+    if hasattr(effects, "zz_another"):
+        delattr(effects, "zz_another")
+
+
+def test_two_effects_of_one_slug_are_refused_by_name(another_file):
+    another_file(
         "from irb140_jax.effects.coulomb_friction import CoulombFriction\n\n\n"
         "class SecondCoulomb(CoulombFriction):\n    pass\n"
     )
-    (tmp_path / "zz_second_coulomb.py").write_text(source, encoding="utf-8")
-    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
     with pytest.raises(TypeError, match="coulomb_friction.*SecondCoulomb"):
         _found()
 
 
-def test_the_catalogue_skips_what_a_file_only_imports(tmp_path, monkeypatch):
-    (tmp_path / "zz_imports.py").write_text(
-        "from irb140_jax.effects.coulomb_friction import CoulombFriction as Mine\n", encoding="utf-8")  # fmt: skip
-    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+def test_the_catalogue_skips_what_a_file_only_imports(another_file):
+    another_file("from irb140_jax.effects.coulomb_friction import CoulombFriction as Mine\n")
     assert set(_found()) == set(CATALOGUE)
 
 
