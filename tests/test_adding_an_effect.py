@@ -11,7 +11,7 @@ import pytest
 from helpers import ROOT
 
 from irb140_jax import effects
-from irb140_jax.effects import Motion
+from irb140_jax.effects import Motion, RigidBody
 from irb140_jax.effects.catalogue import CATALOGUE, _found
 from irb140_jax.mismatch import DiagnoseConfig, diagnose
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
@@ -41,8 +41,9 @@ def test_the_skeleton_enters_the_catalogue_by_lying_in_its_folder(extended):
 
 def test_the_columns_of_the_skeleton_are_its_formula(extended):
     qd = np.random.default_rng(0).normal(size=(50, 3))
-    q = jnp.zeros_like(qd)
-    motion = Motion(jnp.arange(50.0), q, jnp.asarray(qd), q, q, q, jnp.full(3, 1e-3))
+    q, none = jnp.zeros((50, 3)), jnp.zeros(0)
+    rigid = RigidBody(*(none,) * 7)
+    motion = Motion(jnp.arange(50.0), q, jnp.asarray(qd), *(q,) * 6, rigid, jnp.full(3, 1e-3))
     law = extended["quadratic_drag"]
     w, shape = law.amplitudes({"drag": 1.7})
     torque = law.columns(motion, jnp.array([1]), jnp.asarray(shape)) @ w

@@ -36,4 +36,4 @@ class GravityTilt(AbstractEffect):
         return values["tilt"] * np.array([np.cos(direction), np.sin(direction)]), np.zeros(0)
 
     def where(self, names, values, units):
-        return f"all joints under gravity, at rest too: the base leans by {np.degrees(values['tilt']):.3g} deg"
+        return f"{names}: in the torque of gravity, at rest too; the base leans by {np.degrees(values['tilt']):.3g} deg"

@@ -7,7 +7,7 @@ from irb140_jax.effects.base import AbstractEffect, Parameter
 
 
 class JointElasticity(AbstractEffect):
-    """q_link = q - tau/K: the link lags by u = tau/K, which changes the torque by -(d tau/dq u + d tau/dqd du + M d2u)."""
+    """q_link = q - u, u = tau/K, which changes the torque by -(d tau/dq u + d tau/dqd du/dt + M d2u/dt2)."""
 
     slug = "joint_elasticity"
     title = "a flexible transmission"

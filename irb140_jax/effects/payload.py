@@ -40,4 +40,4 @@ class Payload(AbstractEffect):
         return np.concatenate([[0.0], np.full(9, -np.inf)])
 
     def where(self, names, values, units):
-        return f"all joints that carry the last link, with its weight and inertia: {values['mass']:.3g} kg"
+        return f"{names}: in the weight and inertia of the last link, {values['mass']:.3g} kg more than the model knows"

@@ -29,7 +29,8 @@ class ThermalFrictionDrift(AbstractEffect):
     dissipative = True
 
     def shapes(self, scales, joints):
-        return geometric_grid(0.05 * scales.duration, 2.0 * scales.duration, 6)
+        duration = max(scales.duration, 1.0)
+        return geometric_grid(0.05 * duration, 2.0 * duration, 6)
 
     def refines(self):
         return True

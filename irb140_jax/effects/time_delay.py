@@ -34,4 +34,4 @@ class TimeDelay(AbstractEffect):
         return np.array([values["delay"]]), np.zeros(0)
 
     def where(self, names, values, units):
-        return f"all joints: positions are logged {1e3 * values['delay']:.3g} ms after the torque they belong to"
+        return f"{names}: positions are logged {1e3 * values['delay']:.3g} ms after the torque they belong to"

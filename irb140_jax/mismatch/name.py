@@ -80,7 +80,7 @@ class Problem:
         gain, mean = gains(H, near.groups, len(self.candidates), self.lowest.shape[1])
         with np.errstate(invalid="ignore"):
             bad = np.any((mean < self.lowest - 1e-9) | (mean > self.highest + 1e-9), axis=1)
-        return np.where(bad | (self._share(near.which, mean) < LEAST_SHARE), -np.inf, gain + self.log_prior)
+        return np.where(bad | (self._share(mean) < LEAST_SHARE), -np.inf, gain + self.log_prior)
 
     def eliminated_near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
         """Gram matrix of some columns and y, with a set eliminated."""
@@ -103,17 +103,16 @@ class Problem:
             groups: dict[int, list[int]] = defaultdict(list)
             for i in which:
                 groups[len(self.candidates[i].columns)].append(int(i))
-            self._neighbourhoods[joints] = Neighbourhood(which, columns, tuple(
-                Layout(np.array(m), np.array([[number[int(c + self.offset)] for c in self.candidates[i].columns] for i in m]))
-                for m in groups.values()
-            ))  # fmt: skip
+            local = lambda i: [number[int(c + self.offset)] for c in self.candidates[i].columns]  # noqa: E731
+            layout = tuple(Layout(np.array(m), np.array([local(i) for i in m])) for m in groups.values())
+            self._neighbourhoods[joints] = Neighbourhood(which, columns, layout)
         return self._neighbourhoods[joints]
 
     @cached_property
     def _neighbourhoods(self) -> dict[frozenset[int] | None, "Neighbourhood"]:
         return {}
 
-    def _share(self, which: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    def _share(self, mean: np.ndarray) -> np.ndarray:
         """Torque of each candidate with these amplitudes, as a share of the torque of the joint it matters most to."""
         share = np.zeros(len(self.candidates))
         for g, G in zip(self.groups, self._own_grams, strict=True):
