@@ -6,3 +6,4 @@ from irb140_jax.robot.robot import Robot as Robot
 from irb140_jax.robot.robot import with_phi as with_phi
 from irb140_jax.robot.shipped import irb140 as irb140
 from irb140_jax.robot.shipped import irb140_path as irb140_path
+from irb140_jax.robot.subchain import first_joints as first_joints

@@ -1,0 +1,154 @@
+"""Control laws against their formulas, told by MuJoCo; references against the geometry they promise."""
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from helpers import IRB140_XML, random_robot, random_state, shipped_robot
+
+from irb140_jax import control, dynamics, kinematics
+from irb140_jax.errors import InputError
+from irb140_jax.oracle import mujoco as oracle
+from irb140_jax.robot import first_joints
+
+WHOLE, _ = shipped_robot()
+ARM = first_joints(WHOLE, 3)
+# Wrist bent and tool down: straight, as at zero, it is singular.
+TOOL_DOWN = jnp.array([0.0, 0.0, 0.0, 0.0, np.pi / 2, 0.0])
+SLOPE, GAIN, LAYER, DAMPING = 8.0, np.array([30.0, 40.0, 10.0]), 0.2, 5.0
+# Torques of some 100 N m in double precision.
+ROUND_OFF = 1e-11
+
+
+def law(robot, model, switching, form, q, qd, wanted):
+    """The law of the docstring in NumPy, M, C and g by other routines than the controller's."""
+    e, ed = wanted[0] - q, wanted[1] - qd
+    s, a = ed + SLOPE * e, wanted[2] + SLOPE * ed
+    f = {"sign": np.sign(s), "tanh": np.tanh(s / LAYER), "saturation": np.clip(s / LAYER, -1.0, 1.0)}[switching]
+    tau = oracle.inverse_dynamics(model, q, qd, a) + np.asarray(robot.frictionloss) * np.sign(qd)
+    if form == "passivity":
+        tau = tau + np.asarray(dynamics.coriolis_matrix(robot, jnp.asarray(q), jnp.asarray(qd))) @ s
+    return tau + DAMPING * s + GAIN[: robot.n] * f
+
+
+@pytest.mark.parametrize("form", ["computed", "passivity"])
+@pytest.mark.parametrize("switching", ["saturation", "tanh", "sign"])
+def test_sliding_mode_gives_the_torque_of_its_formula(switching, form):
+    robot, model = random_robot("SHS", 4)
+    controller = control.sliding_mode(
+        robot, slope=SLOPE, gain=jnp.asarray(GAIN), layer=LAYER, damping=DAMPING, switching=switching, form=form
+    )
+    for seed in range(3):
+        q, qd, qdd = random_state(3, seed)
+        wanted = (q + 0.01 * qdd, qd - 0.02 * qdd, qdd)
+        tau = controller.torque(
+            jnp.asarray(q), jnp.asarray(qd), (jnp.asarray(wanted[0]), jnp.asarray(wanted[1]), jnp.asarray(qdd))
+        )
+        assert np.allclose(tau, law(robot, model, switching, form, q, qd, wanted), atol=ROUND_OFF)
+
+
+def test_inside_the_layer_torque_is_continuous_and_outside_it_all_switchings_agree():
+    q, qd = jnp.zeros(3), jnp.zeros(3)
+    torque = {
+        kind: control.sliding_mode(ARM, switching=kind).torque(q, qd, (q + 0.5, qd, qd))
+        for kind in ("saturation", "tanh", "sign")
+    }
+    # s / layer is 50 here, where tanh is 1 to the last digit.
+    assert np.allclose(torque["saturation"], torque["sign"]) and np.allclose(torque["tanh"], torque["sign"])
+    near = [control.sliding_mode(ARM).torque(q, qd, (q + shift, qd, qd)) for shift in (-1e-9, 1e-9)]
+    assert np.allclose(near[0], near[1], atol=1e-4)
+    rough = [control.sliding_mode(ARM, switching="sign").torque(q, qd, (q + shift, qd, qd)) for shift in (-1e-9, 1e-9)]
+    assert np.all(np.abs(rough[1] - rough[0]) > 10.0)
+
+
+@pytest.mark.parametrize("wrong", [{"switching": "relay"}, {"form": "guess"}, {"gain": jnp.ones(4)}])
+def test_sliding_mode_refuses_what_it_does_not_know(wrong):
+    with pytest.raises(InputError, match="sliding mode"):
+        control.sliding_mode(ARM, **wrong)
+
+
+@pytest.fixture(scope="module")
+def short_circle():
+    return control.circle(ARM, duration=4.0, dt=0.002, ramp=1.0, radius=0.08, normal=(1.0, 0.0, 1.0))
+
+
+def test_circle_is_a_circle_of_this_radius_in_this_plane(short_circle):
+    T = jax.vmap(kinematics.forward_kinematics, in_axes=(None, 0))(ARM, short_circle.q)
+    normal = np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)
+    start = np.asarray(kinematics.forward_kinematics(ARM, ARM.reference)[:3, 3])
+    centre = start - 0.08 * np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0)
+    away = np.asarray(T[:, :3, 3]) - centre
+    assert np.allclose(away @ normal, 0.0, atol=1e-11) and np.allclose(np.linalg.norm(away, axis=1), 0.08, atol=1e-11)
+    turned = np.unwrap(np.arctan2(away @ np.cross(normal, away[0] / 0.08), away @ away[0] / 0.08))
+    assert np.isclose(turned[-1] - turned[0], 2.0 * np.pi, atol=1e-9)
+
+
+def test_circle_begins_and_ends_at_rest_without_a_jolt(short_circle):
+    for x in (short_circle.qd, short_circle.qdd):
+        assert np.allclose(x[0], 0.0, atol=1e-12) and np.allclose(x[-1], 0.0, atol=1e-12)
+    # The largest step of the acceleration, over 2 ms: no jump.
+    assert np.abs(np.diff(short_circle.qdd, axis=0)).max() < 0.02 * np.abs(short_circle.qdd).max()
+
+
+def test_velocities_and_accelerations_are_derivatives_of_the_positions(short_circle):
+    dt = 0.002
+    for x, rate in ((short_circle.q, short_circle.qd), (short_circle.qd, short_circle.qdd)):
+        # Central differences: off by dt^2 / 6 times a rate's second derivative, some 20 rad/s^4 where the ramp sets in.
+        assert np.allclose((x[2:] - x[:-2]) / (2.0 * dt), rate[1:-1], atol=3e-5)
+
+
+def test_six_joints_keep_the_tools_orientation():
+    reference = control.circle(WHOLE, duration=2.0, dt=0.01, ramp=1.0, radius=0.05, posture=TOOL_DOWN)
+    T = jax.vmap(kinematics.forward_kinematics, in_axes=(None, 0))(WHOLE, reference.q)
+    start = kinematics.forward_kinematics(WHOLE, TOOL_DOWN)
+    assert np.allclose(T[:, :3, :3], start[:3, :3], atol=1e-11)
+    assert np.isclose(np.ptp(T[:, 1, 3]), 0.1, atol=1e-4)
+    assert np.allclose(np.gradient(reference.q, 0.01, axis=0)[1:-1], reference.qd[1:-1], atol=1e-3)
+
+
+def test_path_of_the_closed_form_is_that_of_the_iteration():
+    reference = control.circle(WHOLE, duration=2.0, dt=0.01, ramp=1.0, radius=0.05, posture=TOOL_DOWN)
+    q = reference.q[::20]
+    T = jax.vmap(kinematics.forward_kinematics, in_axes=(None, 0))(WHOLE, q)
+    closed = jax.vmap(lambda T, q: kinematics.nearest_solution(WHOLE, T, q)[0])(T, q)
+    assert np.allclose(closed, q, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"radius": 3.0}, {"duration": 1.0}, {"normal": (0.0, 0.0, 0.0)}, {"centre": (0.0, 0.0, 5.0)}]
+)
+def test_a_circle_that_can_not_be_is_refused(wrong):
+    with pytest.raises(InputError):
+        control.circle(ARM, **{"duration": 4.0, "dt": 0.01, **wrong})
+
+
+def test_a_path_for_two_joints_is_refused_with_what_would_do():
+    with pytest.raises(InputError, match="first_joints"):
+        control.circle(first_joints(WHOLE, 2), duration=4.0, dt=0.01)
+
+
+def test_first_joints_are_mujocos_arm_with_the_other_joints_removed():
+    spec = mujoco.MjSpec.from_file(str(IRB140_XML))
+    for actuator in list(spec.actuators)[3:]:
+        spec.delete(actuator)
+    for name in ("joint4", "joint5", "joint6"):
+        spec.delete(spec.joint(name))
+    model = oracle.oracle_model(spec.compile())
+    for seed in range(3):
+        q, qd, qdd = random_state(3, seed)
+        tau = dynamics.inverse_dynamics(ARM, *(jnp.asarray(x) for x in (q, qd, qdd)))
+        assert np.allclose(tau, oracle.inverse_dynamics(model, q, qd, qdd), atol=ROUND_OFF)
+        T = kinematics.forward_kinematics(ARM, jnp.asarray(q))
+        assert np.allclose(T, oracle.forward_kinematics(model, q), atol=1e-13)
+
+
+def test_first_joints_may_hold_the_others_anywhere():
+    held = jnp.array([0.0, 0.0, 0.0, 0.4, 0.9, -0.7])
+    arm = first_joints(WHOLE, 3, held)
+    q, qd, qdd = (jnp.asarray(x) for x in random_state(3, 0))
+    pad = lambda x, rest: jnp.concatenate([x, rest])  # noqa: E731
+    whole = dynamics.inverse_dynamics(WHOLE, pad(q, held[3:]), pad(qd, jnp.zeros(3)), pad(qdd, jnp.zeros(3)))
+    assert np.allclose(dynamics.inverse_dynamics(arm, q, qd, qdd), whole[:3], atol=ROUND_OFF)
+    T = kinematics.forward_kinematics(WHOLE, pad(q, held[3:]))
+    assert np.allclose(kinematics.forward_kinematics(arm, q), T, atol=1e-13)
