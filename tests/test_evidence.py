@@ -58,7 +58,8 @@ def rows_by_hand(data: list[Stretch], noise: Noise) -> tuple[np.ndarray, np.ndar
 def log_evidence(X: np.ndarray, y: np.ndarray, scale: np.ndarray) -> float:
     """log N(y; 0, 1 + X W W X'), written out."""
     covariance = np.eye(len(y)) + (X * scale**2) @ X.T
-    return float(stats.multivariate_normal.logpdf(y, mean=np.zeros(len(y)), cov=covariance)  # pyright: ignore[reportArgumentType])
+    density = stats.multivariate_normal(np.zeros(len(y)), covariance)  # pyright: ignore[reportArgumentType]
+    return float(density.logpdf(y))
 
 
 def candidates() -> list[Candidate]:

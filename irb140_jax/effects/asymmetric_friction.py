@@ -21,6 +21,7 @@ class AsymmetricFriction(AbstractEffect):
         "coulomb_friction": "the same stretch in both directions, with dwells in the same posture",
     }
     needs = "motion in both directions"
+    feigned = 0.02  # errors of other laws are the same in both directions
     friction = True
     dissipative = True
 

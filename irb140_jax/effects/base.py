@@ -102,6 +102,9 @@ class AbstractEffect(abc.ABC):
         variants: Subsets of the columns that make sense by themselves.
         confused_with: Slug of a look-alike -> the motion which separates the two.
         needs: The motion that would show the effect.
+        feigned: Share of a joint's friction torque that other, imperfect laws may put into this effect's columns; less
+            is no evidence for it.
+        ordinary: Nearly every machine has it: rarer laws must beat it clearly.
         friction: It rubs inside the transmission, so it is no part of the load that the transmission carries.
         dissipative: It can only take energy out of the arm, at every instant.
         mjcf: How MJCF expresses it, or None.
@@ -118,6 +121,8 @@ class AbstractEffect(abc.ABC):
     variants: ClassVar[tuple[tuple[int, ...], ...]]
     confused_with: ClassVar[dict[str, str]] = {}
     needs: ClassVar[str]
+    feigned: ClassVar[float] = 0.03
+    ordinary: ClassVar[bool] = False
     friction: ClassVar[bool] = False
     dissipative: ClassVar[bool] = False
     mjcf: ClassVar[str | None] = None

@@ -22,6 +22,7 @@ class CoulombFriction(AbstractEffect):
         "viscous_friction": "the same move at two speeds",
     }
     needs = "motion that reverses direction"
+    ordinary = True
     friction = True
     dissipative = True
     mjcf = "joint frictionloss"

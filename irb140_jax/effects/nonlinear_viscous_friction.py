@@ -22,6 +22,7 @@ class NonlinearViscousFriction(AbstractEffect):
         "viscous_friction": "constant speeds over the whole range",
     }
     needs = "constant speeds over the whole speed range"
+    feigned = 0.06  # every lubricant bends a little: Coulomb and viscous friction fit real joints to some percent
     friction = True
     dissipative = True
 

@@ -17,7 +17,7 @@ class StribeckFriction(AbstractEffect):
     parameters = (
         Parameter("coulomb", "{tau}", low=0.0),
         Parameter("static", "{tau}", low=0.0),
-        Parameter("stribeck_velocity", "{q}/s", low=0.0),
+        Parameter("stribeck_velocity", "{q}/s", low=1e-6),
     )
     contains = ("coulomb_friction",)
     variants = ((0, 1),)

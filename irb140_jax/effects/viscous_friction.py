@@ -20,6 +20,7 @@ class ViscousFriction(AbstractEffect):
         "transmission_coupling": "move each of the two joints with the other at rest",
     }
     needs = "motion at clearly different speeds"
+    ordinary = True
     friction = True
     dissipative = True
     mjcf = "joint damping"

@@ -101,10 +101,11 @@ def problem(data: Data, noise: Noise) -> tuple[Problem, Grams]:
     shapes: dict[tuple[str, tuple[int, ...]], int] = {}
     for c in data.candidates:
         shapes[c.slug, c.joints] = shapes.get((c.slug, c.joints), 0) + 1
-    log_prior = np.array([
+    rare = np.array([
         -np.log(sites) - np.log(shapes[c.slug, c.joints]) + (LOOSE_PRIOR if c.slug == "inertials" else 0.0)
         for c in data.candidates
     ])  # fmt: skip
+    log_prior = np.where([c.effect.ordinary for c in data.candidates], -np.log(2.0), rare)
     width = max(len(c.columns) for c in data.candidates)
     lowest = np.full((len(data.candidates), width), -np.inf)
     highest = np.full((len(data.candidates), width), np.inf)
@@ -117,7 +118,9 @@ def problem(data: Data, noise: Noise) -> tuple[Problem, Grams]:
         for j in range(len(energy)):
             white = noise.whitened(s.tau[:, j], j, r)
             energy[j] += np.sum(white[Noise.usable(s.use[:, j])] ** 2)
-    return Problem(H, g.per_joint, energy, data.candidates, data.nuisances, log_prior, lowest, highest), g
+    offset = data.nuisances
+    entry = rare - log_prior
+    return Problem(H, g.per_joint, energy, data.candidates, offset, log_prior, entry, lowest, highest), g
 
 
 def first_noise(data: Data) -> Noise:

@@ -16,7 +16,7 @@ from irb140_jax.mismatch.evidence import posterior
 from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior
 from irb140_jax.mismatch.findings import findings, not_testable, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
-from irb140_jax.mismatch.prove import HeldOut, held_out, held_out_gain, refit_problem
+from irb140_jax.mismatch.prove import HeldOut, held_out, refit_problem, transferring
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
 from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
 from irb140_jax.recordings.condition import choose_band, condition
@@ -93,7 +93,7 @@ def _diagnosed(
         )
     ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, progress)
     progress("proving on data that the fit did not see")
-    ex = _gated(ex)
+    ex = transferring(ex)
     refit_grams, refit_columns = refit_problem(ex)
     proof = held_out(ex, refit_grams, refit_columns)
     progress("looking for structure that no effect explains")
@@ -102,17 +102,6 @@ def _diagnosed(
     model = _model(robot, ex, refit_grams, refit_columns, band)
     diagnosis = _document(robot, ex, proof, found, rest, recordings)
     return Result(diagnosis, model, _views(robot, ex, proof, model, recordings, smooth, diagnosis))
-
-
-def _gated(ex: Explanation) -> Explanation:
-    """Without findings that do not help on unseen data: a name must transfer."""
-    while True:
-        losses = {c: held_out_gain(ex, c)[1] for c in ex.chosen if ex.data.candidates[c].slug != "inertials"}
-        losses = {c: gain for c, gain in losses.items() if gain <= 0}
-        if not losses:
-            return ex
-        worst = min(losses, key=lambda c: losses[c])
-        ex = dataclasses.replace(ex, chosen=tuple(c for c in ex.chosen if c != worst))
 
 
 def _model(robot: Robot, ex: Explanation, refit_grams, refit_columns: np.ndarray, band) -> CorrectedModel:

@@ -119,12 +119,12 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
         for key, value in group_odds(ex.problem, rest).items()
         if set(key[1]) & set(c.joints) and key[0] != "inertials" and key not in taken
     }
-    guard = ex.problem.guard(ex.chosen)[list(c.joints)].max()
+    explained = float(ex.problem.explained(ex.chosen)[list(c.joints)].max())
     own = odds[c.slug, c.joints]
     for key, value in odds.items():
         if key == (c.slug, c.joints) or key[0] in c.effect.contains:
             continue  # a special case has already lost by more than what an imperfect law could feign
-        excess = value - own
+        excess, guard = value - own, CATALOGUE[key[0]].feigned ** 2 * explained
         if c.slug in CATALOGUE[key[0]].contains:
             # A law that contains the named one was not needed; even odds where the search would have taken it.
             odds[key] = own + (PREFER * (excess / (guard + PREFER) - 1.0) if excess > 0 else excess - PREFER)
@@ -137,15 +137,12 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
 
 
 def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[tuple[str, tuple[int, ...]], float]:
-    """Log odds of a special case of the named law together with one more effect, under the latter's name.
-
-    The special case (say, Coulomb friction) is so common that it costs no prior odds.
-    """
+    """Log odds of a special case of the named law together with one more effect, under the latter's name."""
     odds: dict[tuple[str, tuple[int, ...]], float] = {}
     for i, special in enumerate(ex.data.candidates):
         if special.slug not in c.effect.contains or special.joints != c.joints:
             continue
-        base = ex.problem.odds(rest, (i,)) - ex.problem.log_prior[i]
+        base = ex.problem.odds(rest, (i,))
         for (slug, joints), value in group_odds(ex.problem, (*rest, i)).items():
             known = slug == "inertials" or slug in c.effect.contains or slug == c.slug
             if joints == c.joints and not known and special.slug not in CATALOGUE[slug].contains:

@@ -13,7 +13,6 @@ from irb140_jax.mismatch.evidence import Layout, gain_of, gains, layouts, poster
 
 ACCEPT = np.log(100.0)  # posterior odds a finding needs; under the null, a bound of 1 % on a false one (Markov)
 PREFER = np.log(20.0)  # odds at which a law replaces the simpler one that it contains
-FORM_ERROR = 0.03  # no law is exact: 3 % of what a joint's effects explain is not evidence for another effect
 LEAST_SHARE = 0.005  # an effect below this share of its joint's torque is within what smoothing and geometry feign
 MOST = 40  # effects at most in one set
 
@@ -37,7 +36,9 @@ class Problem:
         torque_energy: Squared whitened logged torque of each joint, shape (n,).
         candidates: What may be in the set.
         offset: Column of the first amplitude.
-        log_prior: Log prior odds of each candidate, shape (len(candidates),).
+        log_prior: Log prior odds of each candidate beside its rivals, shape (len(candidates),).
+        entry: Log odds that a candidate lacks to enter where nothing was: ordinary effects are likely rivals of others,
+            but no likelier to be found by chance.
         lowest, highest: Admissible amplitudes in prior units, per candidate, padded with -inf and inf.
     """
 
@@ -47,6 +48,7 @@ class Problem:
     candidates: tuple[Candidate, ...]
     offset: int
     log_prior: np.ndarray
+    entry: np.ndarray
     lowest: np.ndarray
     highest: np.ndarray
 
@@ -136,14 +138,14 @@ class Problem:
         H = self.eliminated_near(rest, columns)
         return gain_of(H, np.arange(len(columns))) + float(sum(self.log_prior[c] for c in chosen))
 
-    def guard(self, chosen: tuple[int, ...]) -> np.ndarray:
-        """Log odds that imperfect laws could feign at each joint, shape (n,)."""
+    def explained(self, chosen: tuple[int, ...]) -> np.ndarray:
+        """Half the whitened squared torque that a set explains at each joint, shape (n,)."""
         index = self.columns(chosen)
         if len(index) == 0:
             return np.zeros(len(self.per_joint))
         v = posterior(self.H, index).mean
         explained = np.einsum("i,jik,k->j", v, self.per_joint[:, index[:, None], index[None, :]], v)
-        return 0.5 * FORM_ERROR**2 * explained
+        return 0.5 * explained
 
 
 def search(problem: Problem, start: tuple[int, ...] = ()) -> tuple[int, ...]:
@@ -183,7 +185,7 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
     """Add the best candidate, settle around it, and again, until none is worth adding."""
     seen: set[frozenset[int]] = set()
     while len(chosen) < MOST:
-        scores = problem.scores(chosen) - _hurdle(problem, chosen) - ACCEPT
+        scores = problem.scores(chosen) + problem.entry - _hurdle(problem, chosen) - ACCEPT
         scores[[*chosen, *banned]] = -np.inf
         scores = np.where(_conflicts(problem, chosen), -np.inf, scores)
         best = int(np.argmax(scores))
@@ -197,8 +199,9 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
 
 
 def _hurdle(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
-    """Guard of each candidate: of the most suspect joint it touches."""
-    return np.max(np.where(problem.at_joint, problem.guard(chosen)[:, None], 0.0), axis=0)
+    """Log odds that imperfect laws of the set could feign for each candidate, at the joint where they are largest."""
+    explained = np.max(np.where(problem.at_joint, problem.explained(chosen)[:, None], 0.0), axis=0)
+    return np.array([c.effect.feigned**2 for c in problem.candidates]) * explained
 
 
 def _conflicts(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
@@ -249,35 +252,62 @@ def _exchange(
             c = problem.candidates[i]
             if len(drop) == 1 and c.slug in old[0].effect.contains:
                 continue  # `_simplify` decides that
-            richer = any(o.slug in c.effect.contains for o in old)
-            more = len(c.columns) > sum(len(o.columns) for o in old)
-            gain = scores[i] - (PREFER + hurdle[i] if richer or more else 0.0)
+            more = _size(c) > sum(_size(o) for o in old)
+            rarer = all(o.effect.ordinary for o in old) and not c.effect.ordinary
+            # More parameters, or a rarer law in the place of ordinary friction, must be clearly better.
+            gain = scores[i] - (PREFER + hurdle[i] if more or rarer else 0.0)
             if gain > best:
                 best, best_move = gain, (*rest, int(i))
     return best_move
 
 
 def _simplify(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) -> tuple[int, ...] | None:
-    """Put a law's special case in its place where the difference is not clear."""
+    """Put special cases or ordinary friction in the place of a law where the difference is not clear."""
     hurdle = _hurdle(problem, chosen)
     for d in near:
-        member = problem.candidates[d]
-        special = [
-            i for i, c in enumerate(problem.candidates)
-            if c.joints == member.joints and (
-                c.slug in member.effect.contains
-                or c.slug == member.slug and len(c.columns) < len(member.columns)
-                and np.array_equal(c.shape, member.shape)
-            )
-        ]  # fmt: skip
-        if not special:
-            continue
         rest = tuple(x for x in chosen if x != d)
-        scores = problem.scores(rest, member.joints)
-        best = max(special, key=lambda i: scores[i])
-        if problem.odds(rest, (d,)) - scores[best] < PREFER + hurdle[d]:
-            return (*rest, best)
+        options = [
+            o for o in simpler(problem, d) if not any(problem.candidates[i].slug in _slugs(problem, rest, i) for i in o)
+        ]
+        if not options:
+            continue
+        possible = np.isfinite(problem.scores(rest, problem.candidates[d].joints))
+        odds = {o: problem.odds(rest, o) for o in options if possible[list(o)].all()}
+        if not odds:
+            continue
+        best = max(odds, key=lambda o: odds[o])
+        if problem.odds(rest, (d,)) - odds[best] < PREFER + hurdle[d]:
+            return (*rest, *best)
     return None
+
+
+def simpler(problem: Problem, d: int) -> list[tuple[int, ...]]:
+    """What could stand for a law: its special cases, itself with fewer columns, or ordinary friction with as many."""
+    member = problem.candidates[d]
+    if member.effect.ordinary:
+        return []
+    at_site = [(i, c) for i, c in enumerate(problem.candidates) if c.joints == member.joints]
+    fewer = [
+        (i,)
+        for i, c in at_site
+        if c.slug in member.effect.contains
+        or (c.slug == member.slug and len(c.columns) < len(member.columns) and np.array_equal(c.shape, member.shape))
+    ]
+    ordinary = tuple(i for i, c in at_site if c.effect.ordinary)
+    if member.effect.friction and 1 < len(ordinary) <= _size(member):
+        fewer.append(ordinary)
+    return fewer
+
+
+def _size(c: Candidate) -> int:
+    """Parameters of a candidate: amplitudes and shape."""
+    return len(c.columns) + len(c.shape)
+
+
+def _slugs(problem: Problem, chosen: tuple[int, ...], i: int) -> set[str]:
+    """Effects of a set at the site of a candidate."""
+    joints = problem.candidates[i].joints
+    return {problem.candidates[c].slug for c in chosen if problem.candidates[c].joints == joints}
 
 
 def _remove(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) -> tuple[int, ...] | None:
@@ -287,7 +317,7 @@ def _remove(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) ->
         rest = tuple(x for x in chosen if x != d)
         # The score knows what is admissible: what was so when it entered need not be so beside later members.
         fits = np.isfinite(problem.scores(rest, problem.candidates[d].joints)[d])
-        odds[d] = problem.odds(rest, (d,)) - _hurdle(problem, rest)[d] if fits else -np.inf
+        odds[d] = problem.odds(rest, (d,)) + problem.entry[d] - _hurdle(problem, rest)[d] if fits else -np.inf
     if not odds or min(odds.values()) >= ACCEPT:
         return None
     weakest = min(odds, key=lambda d: odds[d])

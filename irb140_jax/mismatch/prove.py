@@ -7,6 +7,7 @@ import numpy as np
 from irb140_jax.mismatch.assemble import problem
 from irb140_jax.mismatch.evidence import Grams, posterior
 from irb140_jax.mismatch.explain import Explanation, full_posterior
+from irb140_jax.mismatch.name import PREFER, simpler
 from irb140_jax.mismatch.noise import noise_from_residuals
 
 
@@ -76,25 +77,56 @@ def held_out(ex: Explanation, refit_grams: Grams, refit_columns: np.ndarray) -> 
     return HeldOut(nominal, out["refit"], out["corrected"], [s.use for s in data.stretches], level)
 
 
+def unseen_error(ex: Explanation, chosen: tuple[int, ...]) -> float:
+    """Whitened squared error of a set on data that its fit did not see."""
+    H, error = ex.grams.blocks, 0.0
+    columns = ex.columns(chosen)
+    index = np.concatenate([columns, [H.shape[1] - 1]])
+    own = dataclasses.replace(ex.grams, blocks=H[:, index[:, None], index[None, :]])
+    every = np.arange(len(columns))
+    for fold in folds(ex.grams):
+        w = np.concatenate([posterior(own.total(fold), every).mean, [-1.0]])
+        error += float(w @ own.blocks[fold].sum(axis=0) @ w)
+    return error
+
+
 def held_out_gain(ex: Explanation, without: int) -> tuple[float, float]:
     """What a finding is worth on unseen data.
 
     Returns:
-        Share of the whitened squared error, beyond the noise, that the finding removes; and the log-likelihood gain.
+        Share of the whitened squared error, noise included, that the finding removes; and the log-likelihood gain.
     """
-    H = ex.grams.blocks
-    errors = {"with": 0.0, "without": 0.0}
-    rows = 0.0
-    for fold in folds(ex.grams):
-        unseen = H[fold].sum(axis=0)
-        rows += ex.grams.rows[fold].sum()
-        for name, chosen in (("with", ex.chosen), ("without", tuple(c for c in ex.chosen if c != without))):
-            columns = ex.columns(chosen)
-            w = np.concatenate([posterior(ex.grams.total(fold), columns).mean, [-1.0]])
-            index = np.concatenate([columns, [H.shape[1] - 1]])
-            errors[name] += float(w @ unseen[np.ix_(index, index)] @ w)
-    drop = errors["without"] - errors["with"]
-    return drop / max(errors["without"], 1e-300), 0.5 * drop
+    rest = unseen_error(ex, tuple(c for c in ex.chosen if c != without))
+    drop = rest - unseen_error(ex, ex.chosen)
+    return drop / max(rest, 1e-300), 0.5 * drop
+
+
+def transferring(ex: Explanation) -> Explanation:
+    """The explanation without findings, or refinements of a simpler law, that do not help on unseen data.
+
+    A name must transfer: a refinement by as much as the search asks of it on seen data, a finding at all.
+    """
+    while True:
+        error = unseen_error(ex, ex.chosen)
+        worst, better = 0.0, ex.chosen
+        for c in ex.chosen:
+            if ex.data.candidates[c].slug == "inertials":
+                continue
+            rest = tuple(x for x in ex.chosen if x != c)
+            taken = {_site(ex, x) for x in rest}
+            options = [o for o in simpler(ex.problem, c) if not any(_site(ex, i) in taken for i in o)]
+            for option, least in ((), 0.0), *((o, PREFER) for o in options):
+                loss = 0.5 * (unseen_error(ex, (*rest, *option)) - error) - least
+                if loss < worst:
+                    worst, better = loss, (*rest, *option)
+        if better == ex.chosen:
+            return ex
+        ex = dataclasses.replace(ex, chosen=better)
+
+
+def _site(ex: Explanation, candidate: int) -> tuple[str, tuple[int, ...]]:
+    c = ex.data.candidates[candidate]
+    return c.slug, c.joints
 
 
 def jackknife_factor(ex: Explanation) -> np.ndarray:
