@@ -27,6 +27,20 @@ HIDDEN_ON = {
     "torque_offset": ("joint1",),
     "torque_gain": ("joint2",),
     "transmission_coupling": ("joint2", "joint3"),
+    "nonlinear_viscous_friction": ("joint1",),
+    "thermal_friction_drift": ("joint1",),
+    "presliding_hysteresis": ("joint1",),
+    "position_dependent_friction": ("joint1",),
+    "torque_ripple": ("joint1",),
+    "gravity_spring": ("joint2",),
+    "time_delay": (),  # on every joint
+    "gravity_tilt": (),
+}
+NOT_ON_THIS_MACHINE = {
+    "payload": "its weight is within what the last link's own inertials may err by",
+    "encoder_offset": "gravity has no slope on any of its joints",
+    "joint_elasticity": "no softer than 8 Hz, it is a hundredth of the torque",
+    "actuator_lag": "of 4 ms, it is a hundredth of the torque, and a step of the engine a quarter of it",
 }
 SHARE = 0.15  # of the joint's torque
 
@@ -52,14 +66,15 @@ every_effect = pytest.mark.parametrize("effect", HIDDEN_ON)
 
 
 def test_every_effect_of_the_catalogue_is_hidden_once():
-    assert set(HIDDEN_ON) == set(CATALOGUE)
+    assert set(HIDDEN_ON) | set(NOT_ON_THIS_MACHINE) == set(CATALOGUE)
 
 
 @every_effect
 def test_the_hidden_effect_is_named_on_its_joints_and_nothing_else_is(effect):
     diagnosis = diagnosed(effect)[1].diagnosis
     assert diagnosis["verdict"] == "physics_left_out"
-    assert [(f["effect"], tuple(f["joints"])) for f in diagnosis["findings"]] == [(effect, HIDDEN_ON[effect])]
+    joints = HIDDEN_ON[effect] or ("joint1", "joint2", "joint3")
+    assert [(f["effect"], tuple(f["joints"])) for f in diagnosis["findings"]] == [(effect, joints)]
     assert effect not in {entry["effect"] for entry in diagnosis["not_testable"]}
 
 
@@ -68,7 +83,7 @@ def test_parameters_of_the_hidden_effect_are_recovered(effect):
     case, result = diagnosed(effect)
     found = result.diagnosis["findings"][0]["parameters"]
     for name, truth in case.truth["effects"][0]["parameters"].items():
-        if name == "sign":  # no parameter of the vocabulary
+        if name not in found:  # signs, phases and directions are no parameters of the vocabulary
             continue
         # Every search started without the effect, that is at zero.
         error = abs(found[name]["value"] - truth["value"])

@@ -6,7 +6,7 @@ data forms the Gram matrix of each stretch of each joint, and from then on no se
 
 import dataclasses
 from collections.abc import Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import equinox as eqx
@@ -65,6 +65,37 @@ class Library:
     blocks: tuple[tuple[AbstractEffect, np.ndarray, np.ndarray, int], ...]
     size: int
 
+    @cached_property
+    def entries(self) -> tuple[np.ndarray, np.ndarray]:
+        """Joint and amplitude of every column that isn't zero throughout, in the order in which they are evaluated."""
+        joints, amplitudes = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
+        for effect, sites, shapes, first in self.blocks:
+            rows = np.tile(np.arange(self.robot.n), (len(sites), 1)) if effect.everywhere else sites
+            width = max(max(v) for v in effect.variants) + 1
+            S, G, m = len(sites), shapes.shape[1], rows.shape[1]
+            amplitude = first + np.arange(S * G * width).reshape(S, G, 1, width)
+            joints.append(np.broadcast_to(rows[:, None, :, None], (S, G, m, width)).ravel())
+            amplitudes.append(np.broadcast_to(amplitude, (S, G, m, width)).ravel())
+        return np.concatenate(joints), np.concatenate(amplitudes)
+
+    def spread(self, entries: np.ndarray) -> np.ndarray:
+        """Columns by joint and amplitude, (T, n, size), from the non-zero ones, (T, entries)."""
+        joints, amplitudes = self.entries
+        out = np.zeros((len(entries), self.robot.n, self.size))
+        out[:, joints, amplitudes] = entries
+        return out
+
+    def torque(self, entries: np.ndarray, columns: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Torque (T, n) of some amplitudes, from the non-zero columns (T, entries)."""
+        joints, amplitudes = self.entries
+        weight = np.zeros(self.size)
+        weight[columns] = w
+        used = np.flatnonzero(np.isin(amplitudes, columns))
+        out = np.zeros((len(entries), self.robot.n))
+        for e in used:
+            out[:, joints[e]] += weight[amplitudes[e]] * entries[:, e]
+        return out
+
 
 def library(robot: Robot, effects: Sequence[AbstractEffect], scales: Scales) -> Library:
     """Lay out the candidates of all effects at all sites."""
@@ -111,7 +142,7 @@ class Columns(NamedTuple):
     Attributes:
         Y: Rigid-body regressor, shape (T, n, 10 n).
         nominal: Torque of the nominal model [N m or N], shape (T, n).
-        effects: Columns of all candidates, shape (T, n, size), zero in rows a candidate does not touch.
+        effects: Columns of all candidates where they aren't zero throughout, shape (T, entries): see `Library.entries`.
     """
 
     Y: np.ndarray
@@ -199,16 +230,13 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None) -> 
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
 @eqx.filter_jit
 def _columns(effects, motion, sites, shapes):
-    T, n = motion.q.shape
-    rows = [jnp.zeros((T, n, 0))]
+    T = len(motion.t)
+    rows = [jnp.zeros((T, 0))]
     for effect, joints, shape in zip(effects, sites, shapes, strict=True):
         joints, shape = jnp.asarray(joints), jnp.asarray(shape)
         per_shape = jax.vmap(partial(effect.columns, motion), in_axes=(None, 0))
         c = jax.vmap(per_shape)(joints, shape)  # (S, G, T, m, k)
-        S, G, _, m, k = c.shape
-        every = jnp.broadcast_to(jnp.eye(n), (S, n, n))
-        onto = every if effect.everywhere else jax.nn.one_hot(joints, n, dtype=c.dtype)
-        rows.append(jnp.einsum("sgtmk,smn->tnsgk", c, onto).reshape(T, n, S * G * k))
+        rows.append(jnp.moveaxis(c, 2, 0).reshape(T, -1))
     return jnp.concatenate(rows, axis=-1)
 
 
@@ -251,7 +279,7 @@ def stretch(lib: Library, along: Prepared, index: int, band: Band, loads: Loads 
     recording = along.recording
     kept = band.kept(len(recording.t))
     nominal, tau = band.apply(nominal), band.apply(recording.tau)
-    X = np.concatenate([band.apply(Y), band.apply(columns)], axis=-1)
+    X = np.concatenate([band.apply(Y), lib.spread(band.apply(columns))], axis=-1)
     return Stretch(
         index, recording.t[kept], X, tau - nominal, tau, nominal, recording.usable[kept],
         recording.q[kept], recording.qd[kept], recording.qdd[kept],

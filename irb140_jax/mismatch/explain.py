@@ -135,7 +135,7 @@ def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -
 def _loads(lib: Library, data: Data, post: Posterior, chosen, factor: np.ndarray, r: Prepared) -> Loads:
     """Loads of the explained model along a recording."""
     dphi, members, amplitudes = fitted(data, post, chosen, factor)
-    torques = composed(columns_along(lib, r), members, amplitudes, dphi, dphi)
+    torques = composed(lib, columns_along(lib, r), members, amplitudes, dphi, dphi)
     return torques.load, torques.total
 
 

@@ -95,9 +95,10 @@ def _shape_variance(ex: Explanation, index: int) -> np.ndarray:
         return np.ptp(shapes, axis=0) ** 2
     p = np.exp(gain - gain.max())
     p /= p.sum()
-    variance = p @ np.square(shapes - p @ shapes)
+    spread = shapes - p @ shapes
+    variance = p @ (spread * spread)
     # A posterior narrower than the grid is known to the grid's spacing.
-    spacing = np.array([np.min(np.diff(np.unique(x)), initial=np.ptp(x) + 1e-12) for x in shapes.T])
+    spacing = np.array([float(np.min(np.diff(np.unique(x)), initial=np.ptp(x) + 1e-12)) for x in shapes.T])
     return np.maximum(variance, spacing**2 / 12.0)
 
 

@@ -74,6 +74,7 @@ class CorrectedModel:
 
 
 def composed(
+    lib: Library,
     along: Columns,
     candidates: list[Candidate],
     amplitudes: list[np.ndarray],
@@ -83,6 +84,7 @@ def composed(
     """Add up a model's torques along a recording.
 
     Args:
+        lib: The library of the candidates.
         along: Regressor, nominal torque and columns.
         candidates: The effects.
         amplitudes: Amplitudes of each.
@@ -92,7 +94,7 @@ def composed(
     load = nominal + Y @ dphi_corrected
     friction, gain = np.zeros_like(load), np.zeros_like(load)
     for c, w in zip(candidates, amplitudes, strict=True):
-        part = columns[..., c.columns] @ w
+        part = lib.torque(columns, c.columns, w)
         if c.slug == "torque_gain":
             gain += part
         elif c.effect.friction:
@@ -119,11 +121,11 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
     amplitudes = [named.amplitudes for named in model.named]
     along = prepared(model.robot, recording)
-    torques = composed(columns_along(lib, along), candidates, amplitudes, *shifts)
+    torques = composed(lib, columns_along(lib, along), candidates, amplitudes, *shifts)
     if not model.named:
         return torques
     # Columns that depend on the load see the corrected one, as they did in the fit.
-    return composed(columns_along(lib, along, (torques.load, torques.total)), candidates, amplitudes, *shifts)
+    return composed(lib, columns_along(lib, along, (torques.load, torques.total)), candidates, amplitudes, *shifts)
 
 
 def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray]:

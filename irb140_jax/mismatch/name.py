@@ -287,7 +287,7 @@ def simpler(problem: Problem, d: int) -> list[tuple[int, ...]]:
     if member.effect.ordinary:
         return []
     at_site = [(i, c) for i, c in enumerate(problem.candidates) if c.joints == member.joints]
-    fewer = [
+    fewer: list[tuple[int, ...]] = [
         (i,)
         for i, c in at_site
         if c.slug in member.effect.contains
