@@ -13,18 +13,25 @@ else:
     os.environ["JAX_ENABLE_X64"] = "1"
 
 if TYPE_CHECKING:
+    from irb140_jax import control as control
     from irb140_jax import dynamics as dynamics
     from irb140_jax import effects as effects
+    from irb140_jax import identify as identify
     from irb140_jax import kinematics as kinematics
     from irb140_jax import mismatch as mismatch
     from irb140_jax import oracle as oracle
     from irb140_jax import recordings as recordings
     from irb140_jax import report as report
     from irb140_jax import robot as robot
+    from irb140_jax import simulate as simulate
+    from irb140_jax import swarm as swarm
     from irb140_jax.robot import Robot as Robot
     from irb140_jax.robot import load_robot as load_robot
 
-_SUBPACKAGES = ("dynamics", "effects", "kinematics", "mismatch", "oracle", "recordings", "report", "robot")
+_SUBPACKAGES = (
+    "control", "dynamics", "effects", "identify", "kinematics", "mismatch", "oracle", "recordings", "report", "robot",
+    "simulate", "swarm",
+)
 _FROM_ROBOT = ("Robot", "load_robot")
 __all__ = [*_SUBPACKAGES, *_FROM_ROBOT]  # pyright: ignore[reportUnsupportedDunderAll]
 

@@ -15,7 +15,7 @@ LAYERS = (
     ("swarm",),
     ("kinematics", "oracle"),
     ("dynamics",),
-    ("control", "effects", "learned"),
+    ("control", "effects", "learned", "identify"),
     ("simulate",),
     ("recordings",),
     ("mismatch",),

@@ -1,0 +1,68 @@
+"""From qubit angles to unknowns: the map that the study leaves open (readings D1, D2, D3)."""
+
+import abc
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from irb140_jax.errors import InputError
+from irb140_jax.swarm.draws import Draws
+
+
+class Decode(eqx.Module):
+    """How angles become candidates in units of the box."""
+
+    @abc.abstractmethod
+    def angles(self, unknowns: int) -> int:
+        """Number of angles for so many unknowns."""
+
+    @abc.abstractmethod
+    def __call__(self, ones: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
+        """Candidates, given the probability with which each qubit is measured as 1."""
+
+    @abc.abstractmethod
+    def ones(self, candidates: Float[Array, "p d"]) -> Float[Array, "p k"]:
+        """Probabilities of a 1 that give exactly these candidates: the collapsed qubits, where there are any."""
+
+
+class Amplitude(Decode):
+    """D1: no collapse, the unknown is the probability itself, p = lower + (upper - lower) sin^2(theta)."""
+
+    def angles(self, unknowns: int) -> int:
+        return unknowns
+
+    def __call__(self, ones: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
+        return ones
+
+    def ones(self, candidates: Float[Array, "p d"]) -> Float[Array, "p k"]:
+        return candidates
+
+
+class Bits(Decode):
+    """D3: so many qubits an unknown, measured by equation 28 and read as a binary number; D2 is one qubit an unknown.
+
+    bit = 1 if r < |beta|^2, r ~ U(0, 1);  p = lower + (upper - lower) sum_b bit_b 2^(n-1-b) / (2^n - 1)
+
+    Attributes:
+        number: Qubits an unknown, n.
+    """
+
+    number: int = eqx.field(static=True, default=12)
+
+    def __check_init__(self):
+        if not 1 <= self.number <= 52:
+            raise InputError(f"Bits: {self.number} qubits an unknown; give 1 to 52, as a float64 holds no more")
+
+    def angles(self, unknowns: int) -> int:
+        return unknowns * self.number
+
+    def __call__(self, ones: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
+        bits = draws.uniforms(100, ones.shape) < ones
+        weights = 2.0 ** jnp.arange(self.number - 1, -1, -1) / (2.0**self.number - 1.0)
+        return jnp.where(bits.reshape(len(ones), -1, self.number), weights, 0.0).sum(axis=-1)
+
+    def ones(self, candidates: Float[Array, "p d"]) -> Float[Array, "p k"]:
+        whole = jnp.round(candidates * (2.0**self.number - 1.0))[..., None]
+        bits = jnp.floor(whole / 2.0 ** jnp.arange(self.number - 1, -1, -1)) % 2.0
+        return bits.reshape(len(candidates), -1)

@@ -1,0 +1,138 @@
+"""Run swarms: seeds x particles x iterations as one compiled scan over one batched array."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
+from jaxtyping import Array, Float, Key
+
+from irb140_jax.errors import InputError
+from irb140_jax.swarm.base import Clock, History, Rule, Swarm, recorded
+from irb140_jax.swarm.draws import Draws, Generator
+from irb140_jax.swarm.stored import stored
+from irb140_jax.types import Scalar
+
+# Fitness of a candidate (d,) at a share of the iterations done, t/T.  A pytree: its arrays are inputs of the program.
+Objective = Callable[[Float[Array, " d"], Scalar], Scalar]
+
+
+class Minima(NamedTuple):
+    """What the swarms of s seeds found.
+
+    Attributes:
+        x: Best candidates, shape (s, d).
+        fitness: Their fitness, shape (s,); inf where every fitness was NaN.
+        history: Of the start and each iteration, arrays of shape (s, iterations + 1).
+        swarm: The state at the end.
+    """
+
+    x: Float[Array, "s d"]
+    fitness: Float[Array, " s"]
+    history: History
+    swarm: Swarm
+
+
+class Steady(eqx.Module):
+    """A fitness that does not change with the iterations, as an `Objective`."""
+
+    fitness: Callable[[Float[Array, " d"]], Scalar]
+
+    def __call__(self, x: Float[Array, " d"], progress: Scalar) -> Scalar:
+        return self.fitness(x)
+
+
+def minimise(
+    objective: Objective, rule: Rule, lower: Float[Array, " d"], upper: Float[Array, " d"], *, keys: Key[Array, " s"],
+    particles: int = 120, iterations: int = 150, generator: Generator = "hash", mesh: Mesh | None = None,
+) -> Minima:  # fmt: skip
+    """Best of box-bounded unknowns by swarms of several seeds.
+
+    Another seed, box, or number of the rule or objective needs no new program; another number of seeds does.
+
+    Args:
+        objective: Fitness of one candidate, see `Steady` for one without a schedule.  NaN never becomes a best.
+        rule: How the swarm moves, with its settings.
+        lower: Lower ends of the box, shape (d,).
+        upper: Upper ends, shape (d,).
+        keys: A key for every seed, see `seed_keys`.
+        particles: Size of a swarm.
+        iterations: Steps after the first placing.
+        generator: Random numbers by "hash" (fast) or "threefry".
+        mesh: Devices to share the seeds among, along the mesh's first axis; the result is the same.
+
+    Returns:
+        The minima, one a seed.
+
+    Raises:
+        InputError: The box is empty or of the wrong shape, or there are too few particles, iterations or seeds.
+    """
+    lower, upper = _checked(lower, upper, particles, iterations)
+    run = partial(_run, particles=particles, iterations=iterations, generator=generator)
+    if mesh is None:
+        return run(objective, rule, lower, upper, keys)
+    axis, devices = mesh.axis_names[0], mesh.devices.shape[0]
+    if len(keys) % devices:
+        raise InputError(f"{len(keys)} seeds on {devices} devices: give a multiple of {devices} keys, or another mesh")
+    problem = eqx.filter_shard((objective, rule, lower, upper), NamedSharding(mesh, PartitionSpec()))
+    return _run_on(mesh, axis, run, problem, jax.device_put(keys, NamedSharding(mesh, PartitionSpec(axis))))
+
+
+def _checked(lower: Any, upper: Any, particles: int, iterations: int) -> tuple[Array, Array]:
+    low, high = np.asarray(lower, float), np.asarray(upper, float)
+    if low.shape != high.shape or low.ndim != 1:
+        raise InputError(f"box: lower {low.shape} and upper {high.shape}; give two arrays of one shape (d,)")
+    wrong = np.flatnonzero(~(np.isfinite(low) & np.isfinite(high) & (low < high)))
+    if wrong.size:
+        i = wrong[0]
+        raise InputError(f"box: unknown {i} lies in [{low[i]}, {high[i]}]; give finite bounds, the lower one below")
+    if particles < 2 or iterations < 1:
+        raise InputError(f"{particles} particles, {iterations} iterations; give at least 2 particles and 1 iteration")
+    return jnp.asarray(low), jnp.asarray(high)
+
+
+@eqx.filter_jit
+def _run(objective, rule, lower, upper, keys, *, particles: int, iterations: int, generator: Generator) -> Minima:
+    one = partial(_one_seed, objective, rule, lower, upper, particles, iterations, generator)
+    return jax.vmap(one)(keys)
+
+
+@eqx.filter_jit
+def _run_on(mesh: Mesh, axis: str, run, problem, keys) -> Minima:
+    arrays, static = eqx.partition(problem, eqx.is_array)
+    body = lambda arrays, keys: run(*eqx.combine(arrays, static), keys)  # noqa: E731
+    seeds = PartitionSpec(axis)
+    shared = jax.shard_map(body, mesh=mesh, in_specs=(PartitionSpec(), seeds), out_specs=seeds, check_vma=False)
+    return shared(arrays, keys)  # every swarm minds its own business, so nothing is exchanged
+
+
+def _one_seed(objective, rule: Rule, lower, upper, particles: int, iterations: int, generator: Generator, key):
+    """Algorithms 1 and 2 for one swarm."""
+
+    def evaluated(swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
+        candidates = stored(draws.iteration, lambda: rule.candidates(swarm.position, draws))
+        fitness = jax.vmap(objective, (0, None))(lower + (upper - lower) * candidates, clock.progress)
+        return rule.remember(swarm, candidates, jnp.where(jnp.isnan(fitness), jnp.inf, fitness))
+
+    def step(swarm: Swarm, iteration: Array):
+        clock, draws = Clock(iteration, iterations), Draws(key, iteration, generator)
+        moved = evaluated(rule.move(swarm, clock, draws), clock, draws)
+        return moved, recorded(moved)
+
+    d = lower.shape[0]
+    clock, draws = Clock(0, iterations), Draws(key, jnp.asarray(0), generator)
+    position, velocity = rule.start(particles, d, draws)
+    nothing = jnp.full(particles, jnp.inf)
+    blank = Swarm(
+        position, velocity, position, nothing, position[0], nothing[0], jnp.full(d, 0.5), jnp.asarray(0),
+        rule.first_memory(particles, d),
+    )  # fmt: skip
+    first = evaluated(blank, clock, draws)
+    last, rest = lax.scan(step, first, jnp.arange(1, iterations + 1))
+    history = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), recorded(first), rest)
+    return Minima(lower + (upper - lower) * last.solution, last.gbest_fitness, history, last)
