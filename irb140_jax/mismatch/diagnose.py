@@ -118,13 +118,17 @@ def _document(
     robot: Robot, ex: Explanation, proof: HeldOut, found: list[dict[str, Any]], rest: list[Unexplained],
     recordings: Sequence[Recording],
 ) -> dict[str, Any]:  # fmt: skip
+    # Noise is what nothing predicts: less than what the findings leave, where structure without a name is left.
+    floor = proof.floor.copy()
+    for u in rest:
+        floor[u.joint] *= np.sqrt(max(1.0 - u.share, 0.0))
     fit = {
         name: {
             "rmse_nominal": a, "rmse_refit": b, "rmse_corrected": c, "noise_floor": d,
         }
         for name, a, b, c, d in zip(
             robot.joint_names, *(proof.rmse(x).tolist() for x in (proof.nominal, proof.refit, proof.corrected)),
-            proof.floor.tolist(), strict=True,
+            floor.tolist(), strict=True,
         )
     }  # fmt: skip
     inertials = inertial_views(robot, ex)

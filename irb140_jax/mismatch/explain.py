@@ -41,7 +41,6 @@ class Explanation:
         grams: Gram matrices by block.
         chosen: Indices of the candidates in the explanation.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
-        floor: Noise when every column of the library may help.
     """
 
     lib: Library
@@ -51,7 +50,6 @@ class Explanation:
     grams: Grams
     chosen: tuple[int, ...]
     factor: np.ndarray
-    floor: Noise
 
     @property
     def members(self) -> list:
@@ -106,14 +104,13 @@ def explain(
 
 def _settled(lib: Library, data: Data, factor: np.ndarray, chosen: tuple[int, ...], noise: Noise | None) -> Explanation:
     """Search and noise in turn: noise that the last explanation left may hide an effect that it named wrongly."""
-    floor = first_noise(data)
-    noise = noise or floor
+    noise = noise or first_noise(data)
     for _ in range(2):
         prob, g = problem(data, noise)
         chosen = search(prob, chosen)
         noise = _noise_under(data, prob, g, chosen)
     prob, g = problem(data, noise)
-    return Explanation(lib, data, noise, prob, g, search(prob, chosen), factor, floor)
+    return Explanation(lib, data, noise, prob, g, search(prob, chosen), factor)
 
 
 def full_posterior(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without=None) -> Posterior:

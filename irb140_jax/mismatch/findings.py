@@ -98,7 +98,7 @@ def _shape_variance(ex: Explanation, index: int) -> np.ndarray:
     spread = shapes - p @ shapes
     variance = p @ (spread * spread)
     # A posterior narrower than the grid is known to the grid's spacing.
-    spacing = np.array([float(np.min(np.diff(np.unique(x)), initial=np.ptp(x) + 1e-12)) for x in shapes.T])
+    spacing = np.array([min([*np.diff(np.unique(x)).tolist(), float(np.ptp(x)) + 1e-12]) for x in shapes.T])
     return np.maximum(variance, spacing**2 / 12.0)
 
 

@@ -20,7 +20,7 @@ class HeldOut:
         refit: Of the rigid body with refitted inertials.
         corrected: Of refit and findings together.
         use: Rows that count, (R, n).
-        floor: Standard deviation of the noise in the band, shape (n,).
+        floor: Standard deviation of what the explanation leaves on data it did see, parameters paid for, shape (n,).
     """
 
     nominal: list[np.ndarray]
@@ -73,7 +73,7 @@ def held_out(ex: Explanation, refit_grams: Grams, refit_columns: np.ndarray) -> 
                 for name, (columns, mean) in fits.items():
                     out[name][r][rows] -= s.X[rows][..., columns] @ (mean * data.scale[columns])
     nominal = [s.y for s in data.stretches]
-    level = np.minimum(np.sqrt(np.mean(ex.floor.total**2, axis=0)), np.sqrt(np.mean(ex.noise.total**2, axis=0)))
+    level = np.sqrt(np.mean(ex.noise.total**2, axis=0))
     return HeldOut(nominal, out["refit"], out["corrected"], [s.use for s in data.stretches], level)
 
 
