@@ -16,10 +16,14 @@ import sys
 from importlib.metadata import version
 
 import cases
+import rollout_cases
 from goals import GOALS, missed, page, table
 
 from irb140_jax.robot import load_robot
 
+CASES = (
+    cases.inverse_dynamics, cases.paper_style, cases.identification, rollout_cases.rollouts, rollout_cases.runge_kutta,
+)  # fmt: skip
 HERE = pathlib.Path(__file__).parent
 
 
@@ -32,7 +36,7 @@ def main() -> int:
     robot = load_robot(HERE.parent / "assets" / "irb140.xml")
     metrics: dict[str, float] = {}
     failures = []
-    for case in (cases.inverse_dynamics, cases.paper_style, cases.identification):
+    for case in CASES:
         try:
             metrics |= case(robot)
         except Exception as error:  # a benchmark that fails must fail the run, and not hide the others
@@ -51,7 +55,7 @@ def main() -> int:
 
 def machine() -> dict[str, str]:
     """What the figures depend on."""
-    packages = {name: version(name) for name in ("jax", "jaxlib", "numpy", "pin")}
+    packages = {name: version(name) for name in ("jax", "jaxlib", "numpy", "pin", "mujoco")}
     return {"processor": _processor(), "python": platform.python_version(), **packages}
 
 

@@ -11,8 +11,10 @@ from irb140_jax import control, dynamics, simulate
 from irb140_jax.dynamics.chain import chain, plan
 from irb140_jax.dynamics.joint_space import terms
 from irb140_jax.errors import InputError
+from irb140_jax.oracle.closed_loop import sliding_mode_loop
 from irb140_jax.oracle.mjcf import mjcf
 from irb140_jax.robot import first_joints, with_phi
+from irb140_jax.trajectory import Trajectory
 
 WHOLE, _ = shipped_robot()
 ARM = first_joints(WHOLE, 3)
@@ -35,27 +37,16 @@ def sway(n: int, steps: int, dt: float = DT) -> control.Reference:
 
 
 def mujoco_rollout(plant, controller, reference, q0, push) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and torques of `mj_step` with its own Euler, the control law in NumPy with `mj_inverse`."""
-    true, model = (mujoco.MjModel.from_xml_string(mjcf(robot, DT)) for robot in (plant, controller.model))
-    data, believed = mujoco.MjData(true), mujoco.MjData(model)
-    slope, gain, layer = (np.asarray(x) for x in (controller.slope, controller.gain, controller.layer))
-    switch = {"tanh": np.tanh, "sign": np.sign, "saturation": lambda x: np.clip(x, -1.0, 1.0)}[controller.switching]
-    wanted = [np.asarray(x) for x in (reference.q, reference.qd, reference.qdd)]
-    data.qpos[:], data.qvel[:] = q0, wanted[1][0]
-    q, torque = [], []
-    for k in range(len(reference.t) - 1):
-        e, ed = wanted[0][k] - data.qpos, wanted[1][k] - data.qvel
-        believed.qpos[:], believed.qvel[:], believed.qacc[:] = data.qpos, data.qvel, wanted[2][k] + slope * ed
-        mujoco.mj_inverse(model, believed)
-        tau = believed.qfrc_inverse + gain * switch((ed + slope * e) / layer)
-        q.append(data.qpos.copy())
-        torque.append(tau)
-        data.qfrc_applied[:] = tau + push * np.sin(2.0 * np.pi * 2.0 * k * DT)
-        mujoco.mj_step(true, data)
-    return np.array(q), np.array(torque)
+    """The same loop by MuJoCo's C engine and NumPy, with a push at 2 Hz."""
+    true, believed = (mujoco.MjModel.from_xml_string(mjcf(robot, DT)) for robot in (plant, controller.model))
+    wanted = (np.asarray(reference.q), np.asarray(reference.qd), np.asarray(reference.qdd))
+    law = (np.asarray(controller.slope), np.asarray(controller.gain), np.asarray(controller.layer))
+    start = (np.asarray(q0), wanted[1][0])
+    disturbance = lambda t, tau: push * np.sin(2.0 * np.pi * 2.0 * t)  # noqa: E731
+    return sliding_mode_loop(true, believed, wanted, (*law, controller.switching), start, disturbance)
 
 
-@pytest.mark.parametrize(("joints", "switching"), [(3, "saturation"), (3, "tanh"), (3, "sign"), (6, "saturation")])
+@pytest.mark.parametrize(("joints", "switching"), [(3, "saturation"), (3, "sign"), (6, "saturation")])
 def test_closed_loop_is_that_of_mujocos_engine(joints, switching):
     plant = first_joints(WHOLE, joints)
     reference, q0 = sway(joints, 800), sway(joints, 1).q[0] + 0.05
@@ -193,3 +184,33 @@ def test_robots_that_do_not_fit_are_refused():
         simulate.rollout(WHOLE, control.sliding_mode(ARM), sway(3, 10))
     with pytest.raises(InputError, match="steps"):
         simulate.rollout(ARM, control.sliding_mode(ARM), sway(3, 10), every=11)
+
+
+def test_response_of_a_known_second_order_error_is_told_right():
+    t = jnp.arange(0.0, 10.0, 0.001)
+    damping, rate = 0.5, 4.0
+    fast = rate * np.sqrt(1.0 - damping**2)
+    error = jnp.exp(-damping * rate * t) * (jnp.cos(fast * t) + damping * rate / fast * jnp.sin(fast * t))
+    told = simulate.response(t, -0.3 * error)
+    # Textbook figures of a damping of 0.5: overshoot exp(-pi 0.5 / sqrt(0.75)) = 16.3 %, rise 1.64 / 4 s.
+    assert np.isclose(told.overshoot, 100.0 * np.exp(-np.pi * damping / np.sqrt(1.0 - damping**2)), atol=1e-3)
+    assert np.isclose(told.rise, 1.64 / rate, atol=0.01)
+    late = np.asarray(t)[np.abs(np.asarray(error)) > 0.02]
+    assert np.isclose(told.settling, late[-1], atol=0.0011)
+    assert told.steady < 1e-5
+
+
+def test_a_response_that_never_settles_says_so():
+    t = jnp.arange(0.0, 10.0, 0.01)
+    told = simulate.response(t, 0.1 * jnp.cos(5.0 * t))
+    assert told.settling == jnp.inf and np.isclose(told.overshoot, 100.0, atol=1.0)
+
+
+def test_energy_and_roughness_of_a_known_motion():
+    t = jnp.arange(0.0, 2.0 * np.pi, 1e-3)[:, None] * jnp.ones(2)
+    motion = Trajectory(t[:, 0], -jnp.cos(t), jnp.sin(t), jnp.cos(t), 3.0 * jnp.sin(t + 0.5))
+    absolute, signed = simulate.energies(motion)
+    # 3 times the integral of sin(t) sin(t + 0.5): pi cos(0.5) with its sign; with steps of 1e-3 good to 1e-3.
+    assert np.allclose(signed[-1], 3.0 * np.pi * np.cos(0.5), atol=1e-2)
+    assert np.all(np.diff(absolute, axis=0) >= 0.0) and np.all(absolute[-1] > signed[-1])
+    assert np.allclose(simulate.roughness(motion), 3.0 / np.sqrt(2.0), atol=1e-2)

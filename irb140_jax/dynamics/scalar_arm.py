@@ -9,9 +9,9 @@ from typing import NamedTuple, TypeVar
 import jax.numpy as jnp
 
 from irb140_jax.dynamics.chain import Chain, Plan, chain
-from irb140_jax.dynamics.joint_space import solved, terms
-from irb140_jax.dynamics.newton_euler import inward, outward
-from irb140_jax.dynamics.scalars import Number
+from irb140_jax.dynamics.joint_space import UNSTAGED, solved, terms
+from irb140_jax.dynamics.newton_euler import Motion, inward, link_wrench, next_motion, outward, placements
+from irb140_jax.dynamics.scalars import ZERO, Number, cross, dot, plus, scale
 from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.robot import Robot
 
@@ -103,8 +103,28 @@ def stored(q: Scalars, work: Callable[[], Result]) -> Result:
 
 
 def _recursive(arm: ScalarArm, q: Scalars, qd: Scalars, qdd: Scalars) -> Scalars:
+    """Torque of the rigid bodies by the Newton-Euler recursion."""
+    if arm.n <= UNSTAGED:
+        return _in_one_go(arm.links, q, qd, qdd)
     predicate = always(*(jnp.asarray(x) for x in q))
     return inward(*outward(arm.links, list(q), list(qd), list(qdd), predicate), predicate)
+
+
+def _in_one_go(links: Chain, q: Scalars, qd: Scalars, qdd: Scalars) -> Scalars:
+    """The same recursion without stages: half the time to compile, and no slower for so short a chain."""
+    places, motion, motions = placements(links, list(q)), Motion(ZERO, ZERO, scale(-1.0, links.gravity)), []
+    for place, speed, change in zip(places, qd, qdd, strict=True):
+        motion = next_motion(place, motion, speed, change)
+        motions.append(motion)
+    torques: list[Number] = []
+    force, moment = ZERO, ZERO
+    for place, motion in zip(reversed(places), reversed(motions), strict=True):
+        own = link_wrench(place.link, motion)
+        force, moment = plus(own[0], force), plus(own[1], moment)
+        torques.append(dot(place.link.axis, force if place.link.is_slide else moment))
+        force, moment = place.to_parent(force), place.to_parent(moment)
+        moment = plus(moment, cross(place.position, force))
+    return torques[::-1]
 
 
 def _in_terms(arm: ScalarArm, q: Scalars, qd: Scalars, qdd: Scalars, carried: Scalars) -> Scalars:
