@@ -17,12 +17,14 @@ from importlib.metadata import version
 
 import cases
 import rollout_cases
+import swarm_cases
 from goals import GOALS, missed, page, table
 
 from irb140_jax.robot import load_robot
 
 CASES = (
     cases.inverse_dynamics, cases.paper_style, cases.identification, rollout_cases.rollouts, rollout_cases.runge_kutta,
+    swarm_cases.swarms,
 )  # fmt: skip
 HERE = pathlib.Path(__file__).parent
 

@@ -181,7 +181,7 @@ def test_one_qubit_an_unknown_knows_two_values_only():
 def test_collapsed_qubits_are_those_of_the_candidate():
     draws = Draws(jax.random.key(0), jnp.asarray(1))
     candidates = swarm.Bits(12)(jnp.full((20, 60), 0.5), draws)
-    np.testing.assert_array_equal(swarm.Bits(12)(swarm.Bits(12).ones(candidates), draws), candidates)
+    np.testing.assert_array_equal(swarm.Bits(12)(1.0 * swarm.Bits(12).measured(candidates), draws), candidates)
 
 
 def test_a_qubit_is_measured_as_one_as_often_as_its_amplitude_says():

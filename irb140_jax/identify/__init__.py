@@ -10,6 +10,7 @@ from irb140_jax.identify.consistency import consistent_parameters as consistent_
 from irb140_jax.identify.consistency import log_cholesky as log_cholesky
 from irb140_jax.identify.distance import ParameterDistance as ParameterDistance
 from irb140_jax.identify.distance import Penalty as Penalty
+from irb140_jax.identify.distance import Units as Units
 from irb140_jax.identify.distance import box as box
 from irb140_jax.identify.distance import parameter_distance as parameter_distance
 from irb140_jax.identify.judge import Comparison as Comparison

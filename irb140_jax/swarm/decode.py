@@ -4,7 +4,8 @@ import abc
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Bool, Float
 
 from irb140_jax.errors import InputError
 from irb140_jax.swarm.draws import Draws
@@ -21,10 +22,6 @@ class Decode(eqx.Module):
     def __call__(self, ones: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
         """Candidates, given the probability with which each qubit is measured as 1."""
 
-    @abc.abstractmethod
-    def ones(self, candidates: Float[Array, "p d"]) -> Float[Array, "p k"]:
-        """Probabilities of a 1 that give exactly these candidates: the collapsed qubits, where there are any."""
-
 
 class Amplitude(Decode):
     """D1: no collapse, the unknown is the probability itself, p = lower + (upper - lower) sin^2(theta)."""
@@ -34,9 +31,6 @@ class Amplitude(Decode):
 
     def __call__(self, ones: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
         return ones
-
-    def ones(self, candidates: Float[Array, "p d"]) -> Float[Array, "p k"]:
-        return candidates
 
 
 class Bits(Decode):
@@ -59,10 +53,11 @@ class Bits(Decode):
 
     def __call__(self, ones: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
         bits = draws.uniforms(100, ones.shape) < ones
-        weights = 2.0 ** jnp.arange(self.number - 1, -1, -1) / (2.0**self.number - 1.0)
+        weights = 2.0 ** np.arange(self.number - 1, -1, -1) / (2.0**self.number - 1.0)
         return jnp.where(bits.reshape(len(ones), -1, self.number), weights, 0.0).sum(axis=-1)
 
-    def ones(self, candidates: Float[Array, "p d"]) -> Float[Array, "p k"]:
-        whole = jnp.round(candidates * (2.0**self.number - 1.0))[..., None]
-        bits = jnp.floor(whole / 2.0 ** jnp.arange(self.number - 1, -1, -1)) % 2.0
+    def measured(self, candidates: Float[Array, "p d"]) -> Bool[Array, "p k"]:
+        """The bits of these candidates."""
+        whole = jnp.round(candidates * (2.0**self.number - 1.0)).astype(int)[..., None]
+        bits = (whole & 2 ** np.arange(self.number - 1, -1, -1)) > 0
         return bits.reshape(len(candidates), -1)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from irb140_jax.swarm.base import Clock, Number, Rule, Swarm, clamped, number
-from irb140_jax.swarm.decode import Amplitude, Decode
+from irb140_jax.swarm.decode import Amplitude, Bits, Decode
 from irb140_jax.swarm.draws import Draws
 from irb140_jax.swarm.schedule import Schedule, constant
 from irb140_jax.swarm.stored import stored
@@ -37,7 +37,7 @@ class QubitPso(Rule):
         patience: Iterations without improvement before a perturbation; inf for never.
         perturbation: Its largest size [rad].
         share: Share of the particles that is perturbed.
-        collapse: Whether bests are kept as what was measured, angles of 0 and pi/2, or as the angles before.
+        collapse: Whether bests are kept as the bits measured, angles of 0 and pi/2, or as the angles before.
         one_is_beta: Whether |beta|^2 = sin^2 or |alpha|^2 = cos^2 is the probability of a 1.
 
     Source: the study's equations 21 to 28 and Algorithm 2.
@@ -69,10 +69,9 @@ class QubitPso(Rule):
         return self.decode(beta if self.one_is_beta else 1.0 - beta, draws)
 
     def remember(self, swarm: Swarm, candidates: Float[Array, "p d"], fitness: Float[Array, " p"]) -> Swarm:
-        if not self.collapse:
+        if not self.collapse or not isinstance(self.decode, Bits):
             return super().remember(swarm, candidates, fitness)
-        ones = self.decode.ones(candidates)
-        theta = jnp.arcsin(jnp.sqrt(ones if self.one_is_beta else 1.0 - ones))
+        theta = jnp.where(self.decode.measured(candidates) == self.one_is_beta, 0.5 * jnp.pi, 0.0)
         kept = super().remember(swarm.with_(position=theta), candidates, fitness)
         return kept.with_(position=swarm.position)
 
