@@ -55,6 +55,6 @@ def page(results: dict) -> str:
         "`runge_kutta`: the same by Runge-Kutta of order 4, against diffrax's Tsit5 at the same fixed step, on the "
         "equations in arrays and on our own in scalars. `swarms`: the study's PSO and angle QPSO one after the other, "
         "30 seeds x 120 particles x 150 iterations of 27 unknowns; pyswarms loops over the seeds, evosax draws two "
-        "random numbers a particle where ours draws two an unknown; `torque_over_distance`: the same sweep on the torque "
-        f"of 2000 samples.\n\n{made}\n\n{table(results['metrics'])}\n"
+        "random numbers a particle where ours draws two an unknown; `torque_over_distance`: the same sweep on the "
+        f"torque of 2000 samples.\n\n{made}\n\n{table(results['metrics'])}\n"
     )
