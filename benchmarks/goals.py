@@ -17,7 +17,7 @@ GOALS = {
     "runge_kutta_diffrax_ratio": (5.0, "min"),
     "swarms_run_s": (1.0, "max"),
     "swarms_with_compile_s": (3.0, "max"),
-    "swarm_pyswarms_ratio": (6.0, "min"),
+    "swarm_pyswarms_ratio": (10.0, "min"),
     "swarm_torque_over_distance": (1.5, "max"),
 }
 

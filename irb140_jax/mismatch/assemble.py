@@ -93,9 +93,9 @@ def assemble(lib: Library, stretches: list[Stretch], factor: np.ndarray, uncerta
     return Data(out, scale, (*lib.candidates, *extra), nuisances)
 
 
-def problem(data: Data, noise: Noise) -> tuple[Problem, Grams]:
-    """Gram matrices under a noise model, ready for the search."""
-    g = grams(data.stretches, noise, data.scale, data.nuisances, BLOCKS)
+def problem(data: Data, noise: Noise, blocks: int = BLOCKS) -> tuple[Problem, Grams]:
+    """Gram matrices under a noise model, ready for the search; with fewer blocks where only their sum is needed."""
+    g = grams(data.stretches, noise, data.scale, data.nuisances, blocks)
     H, _ = eliminated(g.total(), np.arange(data.nuisances))
     sites = len({(c.slug, c.joints) for c in data.candidates})
     shapes: dict[tuple[str, tuple[int, ...]], int] = {}

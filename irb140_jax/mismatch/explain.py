@@ -106,9 +106,10 @@ def _settled(lib: Library, data: Data, factor: np.ndarray, chosen: tuple[int, ..
     """Search and noise in turn: noise that the last explanation left may hide an effect that it named wrongly."""
     noise = noise or first_noise(data)
     for _ in range(2):
-        prob, g = problem(data, noise)
+        prob, g = problem(data, noise, blocks=1)
         chosen = search(prob, chosen)
         noise = _noise_under(data, prob, g, chosen)
+        del prob, g  # hundreds of megabytes, before the next are made
     prob, g = problem(data, noise)
     return Explanation(lib, data, noise, prob, g, search(prob, chosen), factor)
 
