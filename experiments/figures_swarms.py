@@ -8,54 +8,52 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
-from jaxtyping import Array, Float  # noqa: E402
 
-from irb140_jax.swarm import Minima  # noqa: E402
-
-COLOURS = {"reference": "0.35", "pso": "tab:blue", "qpso": "tab:orange"}
+COLOURS = {"reference": "0.35", "PSO": "tab:red", "QPSO": "tab:blue"}
 
 
-def draw(found: dict[str, Minima], reference: Float[Array, " d"], folder: pathlib.Path) -> None:
-    """Write figure6.svg to figure9.svg; estimates are means over the seeds, with a standard deviation."""
-    folder.mkdir(parents=True, exist_ok=True)
-    links = len(reference) // 9
-    com = [f"{axis}{i + 1}" for i in range(links) for axis in "xyz"]
-    inertia = [f"{name}{i + 1}" for i in range(links) for name in ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")]
-    _bars(found, reference, slice(3 * links, None), inertia, "inertia [kg m²]", folder / "figure6.svg")
-    _bars(found, reference, slice(0, 3 * links), com, "centre of mass [m]", folder / "figure7.svg")
-    _convergence(found, folder / "figure8.svg")
-    _boxes(found, folder / "figure9.svg")
+def draw(stored: dict, folder: pathlib.Path) -> None:
+    """Write figure6.svg to figure9.svg out of table3_sets.json; estimates are means of the seeds, with deviations."""
+    sets = {name: np.array(x) for name, x in stored["sets"].items()}
+    reference, names = np.array(stored["reference"]), stored["names"]
+    sought, centres = np.flatnonzero(stored["searched"]), len(reference) // 3
+    inertia, com = sought[sought >= centres], sought[sought < centres]
+    _bars(sets, reference, inertia, names, "inertia [kg m²]", folder / "figure6.svg")
+    _bars(sets, reference, com, names, "centre of mass [m]", folder / "figure7.svg")
+    _convergence({name: np.array(run["curves"]) for name, run in stored["runs"].items()}, folder / "figure8.svg")
+    _boxes({name: np.array(run["fitness"]) for name, run in stored["runs"].items()}, folder / "figure9.svg")
 
 
-def _bars(found: dict[str, Minima], reference, part: slice, names: list[str], label: str, path: pathlib.Path) -> None:
-    figure, axes = plt.subplots(figsize=(0.55 * len(names) + 2, 3.5))
+def _bars(sets: dict, reference: np.ndarray, part: np.ndarray, names: list[str], label: str, path: pathlib.Path):
+    """Values above, errors beneath: two estimates that agree to a few per cent look alike above."""
+    names, reference = [names[i] for i in part], reference[part]
+    figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(0.45 * len(names) + 2.5, 5.5))
     place = np.arange(len(names))
-    axes.bar(place - 0.27, np.asarray(reference)[part], 0.27, color=COLOURS["reference"], label="reference")
-    for k, (name, minima) in enumerate(found.items()):
-        x = np.asarray(minima.x)[:, part]
-        axes.bar(place + 0.27 * k, x.mean(0), 0.27, yerr=x.std(0), color=COLOURS[name], label=name.upper(), capsize=2)
-    axes.set_xticks(place, names, rotation=45)
-    axes.set_ylabel(label)
-    _finish(figure, axes, path)
+    above.bar(place - 0.27, reference, 0.27, color=COLOURS["reference"], label="reference")
+    for k, (name, x) in enumerate(sets.items()):
+        x = x[:, part]
+        above.bar(place + 0.27 * k, x.mean(0), 0.27, yerr=x.std(0), color=COLOURS[name], label=name, capsize=2)
+        error = 100.0 * np.abs(x / reference - 1.0).mean(0)
+        below.bar(place - 0.135 + 0.27 * k, error, 0.27, color=COLOURS[name])
+    below.set_xticks(place, names, rotation=60)
+    below.set(ylabel="mean error [%]", yscale="log")
+    above.set(ylabel=label)
+    _finish(figure, above, path)
 
 
-def _convergence(found: dict[str, Minima], path: pathlib.Path) -> None:
+def _convergence(curves: dict[str, np.ndarray], path: pathlib.Path) -> None:
     figure, axes = plt.subplots(figsize=(6, 3.5))
-    for name, minima in found.items():
-        best = np.asarray(minima.history.best)
-        axes.plot(best.mean(0), color=COLOURS[name], label=name.upper())
+    for name, best in curves.items():
+        axes.plot(best.mean(0), color=COLOURS[name], label=name)
         axes.fill_between(np.arange(best.shape[1]), best.min(0), best.max(0), color=COLOURS[name], alpha=0.2, lw=0)
-    axes.set_yscale("log")
-    axes.set_xlabel("iteration")
-    axes.set_ylabel("best fitness, mean and range of the seeds")
+    axes.set(yscale="log", xlabel="iteration", ylabel="best fitness, mean and range of the seeds")
     _finish(figure, axes, path)
 
 
-def _boxes(found: dict[str, Minima], path: pathlib.Path) -> None:
+def _boxes(fitness: dict[str, np.ndarray], path: pathlib.Path) -> None:
     figure, axes = plt.subplots(figsize=(4, 3.5))
-    axes.boxplot([np.asarray(m.fitness) for m in found.values()], tick_labels=[name.upper() for name in found])
-    axes.set_yscale("log")
-    axes.set_ylabel("final fitness of each seed")
+    axes.boxplot(list(fitness.values()), tick_labels=list(fitness))
+    axes.set(yscale="log", ylabel="final fitness of each seed")
     _finish(figure, axes, path, legend=False)
 
 

@@ -4,21 +4,18 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Iterator
-from functools import cache
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from study_arm import StudyArm
 
 from irb140_jax import identify, swarm
-from irb140_jax.robot import Robot, irb140
 
 # What the text states: Table 3's mean absolute percentage errors, section 3's fitness and figure 8's plateau.
 PUBLISHED = {
     "pso": {"com": 2.94, "inertia": 4.66, "fitness": 2.09, "fitness_sd": 0.901, "plateau": 27},
     "qpso": {"com": 0.43, "inertia": 0.76, "fitness": 1.02, "fitness_sd": 0.923},
 }
-LINKS = (0, 1, 2)
 PARTICLES, ITERATIONS, SEEDS = 120, 150, 30
 C1, C2 = 2.5, 1.5
 
@@ -114,24 +111,29 @@ def rule(reading: Reading) -> swarm.Rule:
     )  # fmt: skip
 
 
-@cache
-def reference(links: tuple[int, ...] = LINKS) -> tuple[Robot, Float[Array, " d"]]:
-    """The IRB 140 and the parameters of its links, set M98."""
-    robot = irb140()
-    return robot, identify.link_parameters(robot, links)
-
-
-def objective(reading: Reading, links: tuple[int, ...] = LINKS) -> identify.ParameterDistance:
-    """Equation 20 as the reading has it, box included."""
-    _, x = reference(links)
+def objective(reading: Reading, arm: StudyArm) -> identify.ParameterDistance:
+    """Equation 20 over the arm's unknowns as the reading has it, box included."""
+    sought = jnp.asarray(arm.searched)
+    x = jnp.where(sought, arm.x, 1.0)  # what is not sought must not divide by zero; it is left out below
     place = 0.5 if reading.place == "centre" else jnp.asarray(np.random.default_rng(0).uniform(size=x.shape))
     lower, upper = identify.box(x, reading.width, place=place)
-    return identify.parameter_distance(x, lower, upper, units=reading.units, penalty=PENALTY[reading.penalty])
+    aim = identify.parameter_distance(x, lower, upper, units=reading.units, penalty=PENALTY[reading.penalty])
+    return identify.ParameterDistance(
+        aim.reference[sought], aim.unit[sought], aim.lower[sought], aim.upper[sought], aim.penalty
+    )
 
 
 def all_readings() -> Iterator[Reading]:
     """Every reading that is tried, each once."""
     return iter(dict.fromkeys(itertools.chain(_pso(), _angles(), _bits(), _penalties(), _others())))
+
+
+def usual_readings() -> Iterator[Reading]:
+    """Those of one problem, a box of 50 % whose middle is not the answer, without bits: enough for another arm."""
+    usual = Reading("pso", place="anywhere").units, 0.5, "anywhere", "t/T"
+    for reading in all_readings():
+        if (reading.units, reading.width, reading.place, reading.penalty) == usual and reading.decode == "D1":
+            yield reading
 
 
 def _problems(units: tuple[identify.Units, ...] = ("normalised", "si", "mm")) -> Iterator[dict]:

@@ -1,12 +1,12 @@
 """Sliding mode control with the identified models: Table 4, figures 14 to 17 and what the text says of them.
 
-    python experiments/table4_control.py                 # three joints, as in the study; some minutes
-    python experiments/table4_control.py --joints 6      # the whole arm
-    python experiments/table4_control.py --robot ARM.xml # any other arm's first joints
-    python experiments/table4_control.py --smoke         # seconds
+    python experiments/table4_control.py                  # three joints, as in the study; some minutes
+    python experiments/table4_control.py --joints 6       # the whole arm
+    python experiments/table4_control.py --robot arm.xml  # any other arm
+    python experiments/table4_control.py --smoke          # a minute
 
-Identified sets are those of results/table3_swarms.json if it is there; else random ones at the published errors, and
-the table says so.  Every reading is stored in results/ when it is done; an interrupted run goes on after it.
+The identified sets are those that table3_swarms.py of the same arm stored.  Every reading is stored when it is done; an
+interrupted run goes on after it.
 """
 
 import dataclasses
@@ -14,7 +14,6 @@ import hashlib
 import itertools
 import json
 import pathlib
-from typing import Literal
 
 import equinox as eqx
 import jax
@@ -22,48 +21,53 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import tyro
+from study_arm import StudyArm, StudyConfig
 from table4_report import write_report
 
 from irb140_jax import control, dynamics, kinematics, simulate
 from irb140_jax.compilation_cache import set_up_compilation_cache
+from irb140_jax.errors import InputError
 from irb140_jax.oracle.closed_loop import sliding_mode_loop
 from irb140_jax.oracle.mjcf import mjcf
-from irb140_jax.robot import Robot, first_joints, irb140, load_robot
+from irb140_jax.recordings.excite import fourier_motion
+from irb140_jax.robot import Robot
 
 MODELS = ("reference", "PSO", "QPSO")
 CONDITIONS = ("nominal", "disturbed")
 SIDES = ("controller", "plant", "both")
 # f of the law, and which speeds C acts on.
 LAWS = (("saturation", "computed"), ("tanh", "computed"), ("sign", "computed"), ("saturation", "passivity"))
-# Mean absolute percentage errors that the study gives, of centres of mass and of inertias.
-PUBLISHED_MAPE = {"PSO": (2.94, 4.66), "QPSO": (0.43, 0.76)}
 SETTLED = 2.0  # [s] after which tracking and roughness count: the error at the start has died out
 THIN = 20  # of the samples, one in so many goes into the figures
+FOURIER_SPEED = 0.1  # share of the joints' largest speeds, for arms that can't follow the circle: as calm as that
 
 
 @dataclasses.dataclass(frozen=True)
-class Config:
-    """What the text leaves open is an option; defaults are ours."""
+class Config(StudyConfig):
+    """What the text leaves open is an option; defaults are ours.
 
-    robot: pathlib.Path | None = None
-    """Model file of another arm; its first joints take the IRB 140's place."""
-    joints: Literal[3, 6] = 3
+    Attributes:
+        seeds: Of the stored sets, so many.
+        duration: Of the motion [s].
+        dt: Step [s].
+        radius: Of the circle [m].
+        start_error: Offset of every joint at the start [rad or m], for rise, settling and overshoot to have a meaning.
+        share: Of the disturbance: of each joint's largest torque along the motion, or of its momentary torque.
+        frequency: Of the disturbance [Hz].
+        rotors: Whether rotor inertia counts; the study has none. Default: with other arms than the study's, whose light
+            wrists need it.
+        oracle: Whether to run MuJoCo beside it, one run per model, condition and side.
+    """
+
     seeds: int = 30
     duration: float = 30.0
     dt: float = 0.001
     radius: float = 0.1
     start_error: float = 0.1
-    """Offset of every joint at the start [rad], for rise, settling and overshoot to have a meaning."""
     share: float = 0.4
-    """Of the disturbance: of each joint's largest torque along the motion, or of its momentary torque."""
     frequency: float = 1.0
-    """Of the disturbance [Hz]."""
     rotors: bool | None = None
-    """Whether rotor inertia counts; the study has none. Default: with six joints only, whose wrist needs it."""
     oracle: bool = True
-    """Whether to run MuJoCo beside it, one run per model, condition and side."""
-    smoke: bool = False
-    out: pathlib.Path = pathlib.Path("results")
 
 
 def reduced(config: Config) -> Config:
@@ -73,38 +77,32 @@ def reduced(config: Config) -> Config:
     return dataclasses.replace(config, seeds=2, duration=5.0, dt=0.002)
 
 
-def arm_of(config: Config) -> Robot:
+def arm_of(config: Config, study: StudyArm) -> Robot:
     """The first joints of the arm, as a rigid body as the study has it."""
-    robot = first_joints(irb140() if config.robot is None else load_robot(config.robot), config.joints)
-    zero = jnp.zeros(robot.n)
-    rotors = config.joints == 6 if config.rotors is None else config.rotors
-    fields = lambda r: (r.armature, r.damping, r.frictionloss, r.stiffness)  # noqa: E731
-    return eqx.tree_at(fields, robot, (robot.armature if rotors else zero, zero, zero, zero))
+    robot = study.reduced()
+    rotors = not study.is_studys if config.rotors is None else config.rotors
+    return eqx.tree_at(lambda r: r.armature, robot, robot.armature if rotors else jnp.zeros(robot.n))
 
 
-def identified(config: Config, arm: Robot) -> tuple[dict[str, tuple[np.ndarray, np.ndarray]], str]:
-    """Centres of mass (seeds, n, 3) and inertias (seeds, n, 3, 3) of each model, and where they come from."""
-    com, inertia = np.asarray(arm.com), np.asarray(arm.inertia)
-    rows, cols = np.triu_indices(3)
-    exact = np.repeat(com[None], config.seeds, 0), np.repeat(inertia[None], config.seeds, 0)
-    sets, path = {"reference": exact}, config.out / "table3_swarms.json"
-    stored = json.loads(path.read_text(encoding="utf-8")).get("sets", {}) if path.is_file() else {}
-    for number, model in enumerate(MODELS[1:]):
-        values = np.asarray(stored.get(model, []), float)
-        if values.ndim == 2 and values.shape[0] >= config.seeds and values.shape[1] == 9 * arm.n:
-            values = values[: config.seeds]
-            source = f"sets of {path}"
-        else:
-            rng = np.random.default_rng([number, 2631])
-            # A normal deviate's mean size is sqrt(2 / pi) of its standard deviation.
-            sigma = np.repeat(PUBLISHED_MAPE[model], (3 * arm.n, 6 * arm.n)) / 100.0 * np.sqrt(np.pi / 2.0)
-            truth = np.concatenate([com.ravel(), inertia[:, rows, cols].ravel()])
-            values = truth * (1.0 + sigma * rng.normal(size=(config.seeds, 9 * arm.n)))
-            source = "random sets at the published mean errors"
-        tensors = np.zeros((config.seeds, arm.n, 3, 3))
-        tensors[..., rows, cols] = tensors[..., cols, rows] = values[:, 3 * arm.n :].reshape(-1, arm.n, 6)
-        sets[model] = values[:, : 3 * arm.n].reshape(-1, arm.n, 3), tensors
-    return sets, source
+def identified(config: Config, study: StudyArm) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Centres of mass (seeds, n, 3) and inertias (seeds, n, 3, 3) of each model, what is beyond counted to the last.
+
+    Raises:
+        InputError: There are no stored sets, or they are of another arm.
+    """
+    path = config.folder(study) / "table3_sets.json"
+    if not path.is_file():
+        raise InputError(f"{path} is not there; run experiments/table3_swarms.py with the same arm and folder first")
+    stored = json.loads(path.read_text(encoding="utf-8"))
+    if not np.array_equal(stored["reference"], np.asarray(study.x)):
+        raise InputError(f"{path} holds sets of '{stored['arm']}', not of '{study.name}'; run table3_swarms.py for it")
+    x = {"reference": np.repeat(np.asarray(study.x)[None], config.seeds, 0)}
+    x |= {model: np.asarray(stored["sets"][model])[: config.seeds] for model in MODELS[1:]}
+    if any(len(values) < config.seeds for values in x.values()):
+        raise InputError(f"{path} holds fewer than {config.seeds} sets; give --seeds, or run table3_swarms.py anew")
+    reduced_arms = jax.jit(jax.vmap(study.reduced))
+    arms = {model: reduced_arms(jnp.asarray(values)) for model, values in x.items()}
+    return {model: (np.asarray(arm.com), np.asarray(arm.inertia)) for model, arm in arms.items()}
 
 
 def with_set(arm: Robot, com: jax.Array, inertia: jax.Array) -> Robot:
@@ -118,22 +116,35 @@ class Task:
 
     arm: Robot
     reference: control.Reference
+    motion: str
     start: jax.Array
     gain: jax.Array
     peak: np.ndarray
 
 
 def task_of(config: Config, arm: Robot) -> Task:
-    """Circle, start, gains by the true model, and the largest torque that each joint needs."""
-    # With six joints the tool points down: straight, as at zero, the wrist is singular.
-    posture = arm.reference.at[4].add(0.5 * jnp.pi) if config.joints == 6 else arm.reference
-    reference = control.circle(
-        arm, duration=config.duration, dt=config.dt, radius=config.radius, posture=posture,
-        ramp=min(2.0, config.duration / 4.0),
-    )  # fmt: skip
+    """Motion, start, gains by the true model, and the largest torque that each joint needs."""
+    reference, motion = motion_of(config, arm)
     needed = dynamics.inverse_dynamics_batch(arm, reference.q, reference.qd, reference.qdd)
     gain = control.sliding_mode(arm).gain
-    return Task(arm, reference, reference.q[0] + config.start_error, gain, np.abs(np.asarray(needed)).max(axis=0))
+    peak = np.abs(np.asarray(needed)).max(axis=0)
+    return Task(arm, reference, motion, reference.q[0] + config.start_error, gain, peak)
+
+
+def motion_of(config: Config, arm: Robot) -> tuple[control.Reference, str]:
+    """The tool's circle; for an arm that can't follow it, a calm motion of its joints; and which, in words."""
+    # With six joints the tool points down: straight, as the IRB 140 is at zero, a wrist is singular.
+    posture = arm.reference.at[4].add(0.5 * jnp.pi) if arm.n == 6 else arm.reference
+    try:
+        reference = control.circle(
+            arm, duration=config.duration, dt=config.dt, radius=config.radius, posture=posture,
+            ramp=min(2.0, config.duration / 4.0),
+        )  # fmt: skip
+    except InputError as reason:
+        played = fourier_motion(arm, config.duration, 1.0 / config.dt, seed=0, speed=FOURIER_SPEED)
+        reference = control.Reference(*map(jnp.asarray, (played.t, played.q, played.qd, played.qdd)))
+        return reference, f"a Fourier motion of the joints, as the circle is not possible ({reason})"
+    return reference, f"a level circle of {config.radius:g} m radius in {config.duration:g} s"
 
 
 def runs_of(config: Config, task: Task, law: tuple):
@@ -175,7 +186,11 @@ def lanes(sets: dict, side: str, arm: Robot, push: np.ndarray, share: np.ndarray
 
 
 def by_mujoco(config: Config, task: Task, args: tuple, lane: int, switching: str) -> np.ndarray:
-    """Joint positions of this lane by MuJoCo's engine and NumPy, shape (T, n)."""
+    """Joint positions of this lane by MuJoCo's engine and NumPy, shape (T, n).
+
+    Raises:
+        ValueError: No body can have the set, so that MuJoCo refuses it.
+    """
     plant, model, push, share = jax.tree.map(lambda x: np.asarray(x)[lane], args)
     true, believed = (
         mujoco.MjModel.from_xml_string(mjcf(with_set(task.arm, *map(jnp.asarray, x)), config.dt))
@@ -192,58 +207,64 @@ def by_mujoco(config: Config, task: Task, args: tuple, lane: int, switching: str
 
 def run(config: Config) -> dict:
     """All readings; each is stored as it is done."""
-    config = reduced(config)
-    arm = arm_of(config)
-    sets, source = identified(config, arm)
+    config, study = reduced(config), config.arm()
+    arm, sets = arm_of(config, study), identified(config, study)
     task = task_of(config, arm)
-    folder = config.out / f"table4_{config.joints}_joints"
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = config.folder(study) / "table4_runs"
+    folder.mkdir(exist_ok=True)
     mark = _mark(config, sets, arm)
-    disturbances = {
-        "of peak": (config.share * task.peak, np.zeros(arm.n)),
-        "of torque": (np.zeros(arm.n), np.full(arm.n, config.share)),
-    }
-    readings = {}
-    for law in LAWS[::3] if config.smoke else LAWS:
+    readings = []
+    for law in LAWS[:1] if config.smoke else LAWS:
         compiled = runs_of(config, task, law)
-        for side, (kind, (push, share)) in itertools.product(SIDES, disturbances.items()):
+        for side, kind in itertools.product(SIDES, ("of peak", "of torque")):
             name = " ".join((side, kind, *law)).replace(" ", "_")
             path = folder / f"{name}.npz"
             if not _is_done(path, mark):
-                args = lanes(sets, side, arm, push, share)
-                measures, traces = jax.block_until_ready(compiled(*args))
-                by = lambda x: np.asarray(x).reshape(len(MODELS), config.seeds, 2, *x.shape[1:])  # noqa: E731
-                store = {f"measure_{key}": by(value) for key, value in measures.items()}
-                apart = by(traces["tau"]) - by(traces["tau"])[:1]
-                store["measure_torque_apart"] = np.sqrt(np.mean(apart**2, axis=-2))
-                store |= {f"trace_{key}": by(value)[:, 0] for key, value in traces.items()}  # the first seed's
-                if config.oracle and law[1] == "computed" and kind == "of peak":
-                    store["mujoco"] = np.array([
-                        [np.abs(by_mujoco(config, task, args, _lane(config, m, c), law[0])[::THIN]
-                                - store["trace_q"][m, c]).max() for c in range(2)]
-                        for m in range(len(MODELS))
-                    ])  # fmt: skip
-                _store(path, mark, store)
+                _store(path, mark, _reading(config, task, compiled, sets, (side, kind, law)))
                 print(f"  done: {side}, disturbance {kind}, {', '.join(law)}", flush=True)
-            readings[name] = str(path)
-    shared = folder / "shared.npz"
-    tool = jax.vmap(lambda q: kinematics.forward_kinematics(arm, q)[:3, 3])
+            readings.append(name)
+    tool = jax.jit(jax.vmap(lambda q: kinematics.forward_kinematics(arm, q)[:3, 3]))
     thin = task.reference.q[:-1][::THIN]
-    np.savez(shared, t=np.asarray(task.reference.t[:-1][::THIN]), q=np.asarray(thin), tool=np.asarray(tool(thin)))
+    t = np.asarray(task.reference.t[:-1][::THIN])
+    np.savez(folder / "shared.npz", t=t, q=np.asarray(thin), tool=np.asarray(tool(thin)))
     return {
-        "config": {key: str(value) for key, value in dataclasses.asdict(config).items()},
-        "robot": arm.name, "joints": list(arm.joint_names), "sets": source, "gain": np.asarray(task.gain).tolist(),
-        "peak_torque": task.peak.tolist(), "shared": str(shared), "readings": readings,
+        "config": config.said(), "robot": study.name, "joints": list(arm.joint_names), "motion": task.motion,
+        "gain": np.asarray(task.gain).tolist(), "peak_torque": task.peak.tolist(), "readings": readings,
     }  # fmt: skip
 
 
-def _lane(config: Config, model: int, condition: int) -> int:
-    return (model * config.seeds) * 2 + condition
+def _reading(config: Config, task: Task, compiled, sets: dict, reading: tuple[str, str, tuple]) -> dict:
+    """Measures of all runs of a reading (model, seed, condition, ...), and traces of the first seed's."""
+    (side, kind, law), none = reading, np.zeros(task.arm.n)
+    push, share = (config.share * task.peak, none) if kind == "of peak" else (none, none + config.share)
+    args = lanes(sets, side, task.arm, push, share)
+    measures, traces = jax.block_until_ready(compiled(*args))
+    by = lambda x: np.asarray(x).reshape(len(MODELS), config.seeds, 2, *x.shape[1:])  # noqa: E731
+    store = {f"measure_{key}": by(value) for key, value in measures.items()}
+    apart = by(traces["tau"]) - by(traces["tau"])[:1]
+    store["measure_torque_apart"] = np.sqrt(np.mean(apart**2, axis=-2))
+    store |= {f"trace_{key}": by(value)[:, 0] for key, value in traces.items()}
+    if config.oracle and law[1] == "computed" and kind == "of peak":
+        store["mujoco"] = np.array([
+            [_apart_from_mujoco(config, task, args, (m, c), law[0], store["trace_q"][m, c]) for c in range(2)]
+            for m in range(len(MODELS))
+        ])  # fmt: skip
+    return store
+
+
+def _apart_from_mujoco(config: Config, task: Task, args: tuple, place: tuple[int, int], switching: str, q) -> float:
+    """Largest difference of a joint's position [rad or m] in the first seed's run; NaN where MuJoCo refuses the set."""
+    model, condition = place
+    try:
+        theirs = by_mujoco(config, task, args, model * config.seeds * 2 + condition, switching)
+    except ValueError:
+        return float("nan")
+    return float(np.abs(theirs[::THIN] - q).max())
 
 
 def _mark(config: Config, sets: dict, arm: Robot) -> str:
     """What a stored result depends on, in one number."""
-    digest = hashlib.sha256(repr(dataclasses.replace(config, out=pathlib.Path())).encode())
+    digest = hashlib.sha256(repr(config.said()).encode())
     for leaf in jax.tree.leaves((sets, arm)):
         digest.update(np.ascontiguousarray(leaf).tobytes())
     return digest.hexdigest()
@@ -262,13 +283,13 @@ def _store(path: pathlib.Path, mark: str, arrays: dict) -> None:
     part.replace(path)
 
 
-def main() -> None:
-    config = tyro.cli(Config)
+def main(config: Config) -> None:
+    """Run what is missing, write table and figures."""
     set_up_compilation_cache()
-    result = run(config)
-    for path in write_report(result, config.out):
+    study = config.arm()
+    for path in write_report(run(config), config.folder(study), config.figure_folder(study)):
         print(path)
 
 
 if __name__ == "__main__":
-    main()
+    main(tyro.cli(Config))

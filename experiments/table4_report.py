@@ -3,16 +3,11 @@
 import json
 import pathlib
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
+from figures_control import CONDITIONS, MODELS, draw
 from scipy import stats
+from study_statistics import difference
 
-MODELS = ("reference", "PSO", "QPSO")
-CONDITIONS = ("nominal", "disturbed")
-COLOURS = ("black", "tab:red", "tab:blue")
 # The reading that the figures show: models in the controller, disturbance of the peak torque, boundary layer.
 SHOWN = "controller_of_peak_saturation_computed"
 # Chance that even one of all statements in all readings is taken for settled by luck (Bonferroni).
@@ -22,21 +17,21 @@ VERDICTS = ("yes", "no, the opposite", "no difference")
 LEVEL = 1e-9
 
 
-def write_report(result: dict, out: pathlib.Path) -> list[pathlib.Path]:
+def write_report(result: dict, folder: pathlib.Path, pictures: pathlib.Path) -> list[pathlib.Path]:
     """Table as JSON and Markdown, and the figures; returns their paths."""
     arm3 = min(2, len(result["joints"]) - 1)
-    measures = {name: measures_of(path) for name, path in result["readings"].items()}
+    runs = folder / "table4_runs"
+    measures = {name: measures_of(runs / f"{name}.npz") for name in result["readings"]}
     table = {name: summary(values, arm3) for name, values in measures.items()}
     claims = {name: judged(values, arm3) for name, values in measures.items()}
     give_verdicts(claims)
-    stem = f"table4_control_{len(result['joints'])}_joints"
-    paths = [out / f"{stem}.json", out / f"{stem}.md"]
+    paths = [folder / "table4_control.json", folder / "table4_control.md"]
     paths[0].write_text(json.dumps({**result, "table": table, "claims": claims}, indent=1) + "\n", encoding="utf-8")
     paths[1].write_text(page(result, table, claims), encoding="utf-8")
-    return paths + figures(result, out, len(result["joints"]))
+    return paths + draw(runs, SHOWN, result["joints"], pictures)
 
 
-def measures_of(path: str) -> dict[str, np.ndarray]:
+def measures_of(path: pathlib.Path) -> dict[str, np.ndarray]:
     """Arrays (model, seed, condition, ...) by name; `mujoco`, if it ran, by (model, condition)."""
     with np.load(path) as stored:
         return {key.removeprefix("measure_"): stored[key] for key in stored if key[:5] == "measu" or key == "mujoco"}
@@ -63,7 +58,7 @@ def summary(values: dict[str, np.ndarray], arm3: int) -> dict:
             for c, condition in enumerate(CONDITIONS)
         }
     if "mujoco" in values:
-        told["largest difference from MuJoCo [rad]"] = float(values["mujoco"].max())
+        told["largest difference from MuJoCo [rad]"] = float(np.nanmax(values["mujoco"]))
     return told
 
 
@@ -109,14 +104,21 @@ def off(x: np.ndarray, model: int) -> np.ndarray:
 
 
 def smaller(statement: str, x: np.ndarray, y: np.ndarray) -> dict:
-    """Whether x is smaller than y over the seeds: Mann-Whitney's two-sided p, and its effect P(x < y) - P(x > y)."""
-    ranks = np.nan_to_num(np.concatenate([x, y]), nan=1e300, posinf=1e300)  # what never gets there comes last
-    level = np.ptp(ranks) <= LEVEL * np.abs(ranks).max()
-    a, b = ranks[: x.size], ranks[x.size :]
-    p = 1.0 if level else float(stats.mannwhitneyu(a, b).pvalue)
-    effect = 0.0 if level else float(np.sign(b[None, :] - a[:, None]).mean())
-    ours = f"{np.median(x):.4g} against {np.median(y):.4g} (medians)"
-    return {"statement": statement, "ours": ours, "p": p, "effect": effect}
+    """Whether x is smaller than y over the seeds.
+
+    Mann-Whitney's two-sided p, its effect P(x < y) - P(x > y), and the interval of the difference of means.
+    """
+    values = np.concatenate([x, y])
+    known = bool(np.isfinite(values).all())
+    # What never gets there comes last.
+    values = values if known else stats.rankdata(np.nan_to_num(values, nan=np.inf))
+    level = np.ptp(values) <= LEVEL * np.abs(values).max()
+    test = difference(values[: x.size], values[x.size :])
+    return {
+        "statement": statement, "ours": f"{np.median(x):.4g} against {np.median(y):.4g} (medians)",
+        "p": 1.0 if level else test["p_value"], "effect": 0.0 if level else 2.0 * test["superiority"] - 1.0,
+        "interval": [test["low"], test["high"]] if known and not level else None,
+    }  # fmt: skip
 
 
 def give_verdicts(claims: dict[str, list[dict]]) -> None:
@@ -133,7 +135,7 @@ def page(result: dict, table: dict, claims: dict) -> str:
         f"# Table 4: {result['robot']}", "",
         "Written by `python experiments/table4_control.py`; don't edit.  The study's cells are not known, only what "
         "its text says of them.", "",
-        f"Identified sets: {result['sets']}.  Gains {np.round(result['gain'], 2).tolist()} N m; largest torque along "
+        f"Motion: {result['motion']}.  Gains {np.round(result['gain'], 2).tolist()} N m; largest torque along "
         f"the motion {np.round(result['peak_torque'], 2).tolist()} N m.", "",
         "## What the text says", "",
         f"Ours: medians over the seeds in the reading *{_words(SHOWN)}*, Mann-Whitney's p, effect P(first smaller) "
@@ -186,61 +188,3 @@ def _readings(names: list[str], count: int) -> str:
 def _cell(x: dict) -> str:
     text = "" if x["mean"] is None else f"{x['mean']:.5g} ± {x['std']:.2g}"
     return text + (f" (never: {x['never']})" if x["never"] else "")
-
-
-def figures(result: dict, out: pathlib.Path, joints: int) -> list[pathlib.Path]:
-    """Figures 14 to 17, of the first seed and the reading `SHOWN`."""
-    with np.load(result["shared"]) as shared, np.load(result["readings"][SHOWN]) as stored:
-        t, wanted = shared["t"], shared["tool"]
-        traces = {key: stored[f"trace_{key}"] for key in ("tau", "energy", "tool")}
-    tail = f"{joints}_joints.png"
-    return [
-        circle_figure(wanted, traces["tool"], out / f"figure14_circle_{tail}"),
-        torque_figure(t, traces["tau"][:, 0], result["joints"], "nominal", out / f"figure15_torque_nominal_{tail}"),
-        torque_figure(t, traces["tau"][:, 1], result["joints"], "disturbed", out / f"figure16_torque_disturbed_{tail}"),
-        energy_figure(t, traces["energy"], result["joints"], out / f"figure17_energy_{tail}"),
-    ]
-
-
-def circle_figure(wanted: np.ndarray, tool: np.ndarray, path: pathlib.Path) -> pathlib.Path:
-    """Tool paths in space, nominal."""
-    figure = plt.figure(figsize=(6, 5))
-    axes = figure.add_subplot(projection="3d")
-    axes.plot(*(1e3 * wanted.T), color="grey", linewidth=3, alpha=0.5, label="wanted")
-    for model, colour, line in zip(MODELS, COLOURS, tool[:, 0], strict=True):
-        axes.plot(*(1e3 * line.T), color=colour, linewidth=1, label=model)
-    axes.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", title="Tool path, nominal")
-    axes.legend()
-    return _saved(figure, path)
-
-
-def torque_figure(t: np.ndarray, tau: np.ndarray, joints: list, condition: str, path: pathlib.Path) -> pathlib.Path:
-    """Motor torque of every joint."""
-    figure, rows = plt.subplots(len(joints), 1, sharex=True, figsize=(8, 2 * len(joints)), squeeze=False)
-    for i, axes in enumerate(rows[:, 0]):
-        for model, colour, line in zip(MODELS, COLOURS, tau, strict=True):
-            axes.plot(t, line[:, i], color=colour, linewidth=1, label=model)
-        axes.set_ylabel(f"{joints[i]} [N m]")
-    rows[0, 0].set_title(f"Motor torque, {condition}")
-    rows[0, 0].legend(ncols=3)
-    rows[-1, 0].set_xlabel("t [s]")
-    return _saved(figure, path)
-
-
-def energy_figure(t: np.ndarray, energy: np.ndarray, joints: list, path: pathlib.Path) -> pathlib.Path:
-    """Absolute work of the motors up to t, all joints, in both conditions."""
-    del joints
-    figure, columns = plt.subplots(1, 2, sharex=True, figsize=(9, 3.5))
-    for c, axes in enumerate(columns):
-        for model, colour, line in zip(MODELS, COLOURS, energy[:, c], strict=True):
-            axes.plot(t, line.sum(axis=-1), color=colour, linewidth=1, label=model)
-        axes.set(xlabel="t [s]", ylabel="energy [J]", title=CONDITIONS[c])
-    columns[0].legend()
-    return _saved(figure, path)
-
-
-def _saved(figure, path: pathlib.Path) -> pathlib.Path:
-    figure.tight_layout()
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
-    return path

@@ -1,14 +1,13 @@
 """What the study's objective leaves out: the same unknowns from the torque of a motion, swarms beside least squares.
 
-    python experiments/torque_swarms.py [--smoke] [--out results]
+    python experiments/torque_swarms.py [--robot arm.xml] [--joints n] [--smoke]
 
-MuJoCo's C engine gives the torques of the IRB 140, with noise; the box holds the truth, but not in its middle.  Judged
-on another motion, without noise.  Writes results/torque_swarms.json and .md.
+MuJoCo's C engine gives the torques of the arm, with noise; the box holds the truth, but not in its middle.  Judged on
+another motion, without noise.  Writes torque_swarms.json and .md.
 """
 
 import dataclasses
 import json
-import pathlib
 import time
 from collections.abc import Callable
 from typing import Any
@@ -20,40 +19,63 @@ import mujoco
 import numpy as np
 import tyro
 from jaxtyping import Array, Float
-from study_readings import LINKS, Reading, rule
+from study_arm import StudyArm, StudyConfig
+from study_readings import SEEDS, Reading, rule
 
 from irb140_jax import identify, swarm
+from irb140_jax.compilation_cache import set_up_compilation_cache
+from irb140_jax.oracle.mjcf import mjcf
 from irb140_jax.recordings.excite import fourier_motion
-from irb140_jax.robot import Robot, irb140, irb140_path
+from irb140_jax.robot import Robot
 from irb140_jax.trajectory import Trajectory
+from irb140_jax.types import Scalar
 
 
 @dataclasses.dataclass(frozen=True)
-class Config:
-    """What to run and where to write.
+class Config(StudyConfig):
+    """What to run.
 
     Attributes:
-        out: Folder of the results.
         duration: Length of either motion [s].
         noise: Standard deviation of the torque, as a share of each joint's RMS.
         width: Half of the box's width, as a fraction of the truth.
         seeds: Runs of each swarm, starts of each descent.
-        smoke: Small swarms, to see that all works.
     """
 
-    out: pathlib.Path = pathlib.Path("results")
     duration: float = 20.0
     noise: float = 0.02
     width: float = 0.5
-    seeds: int = 30
-    smoke: bool = False
+    seeds: int = SEEDS
+
+
+class Unknowns(eqx.Module):
+    """A fit as a function of what is sought of its parameters.
+
+    Attributes:
+        fit: Of all parameters of the links.
+        x: These parameters; those sought are overwritten.
+        place: Where those sought stand in x.
+    """
+
+    fit: identify.LinearFit
+    x: Float[Array, " d"]
+    place: Array
+
+    def __call__(self, unknowns: Float[Array, " u"], progress: Scalar) -> Scalar:
+        return self.fit(self.all(unknowns), progress)
+
+    def residual(self, unknowns: Float[Array, " u"]) -> Float[Array, " m"]:
+        """What least squares minimises."""
+        return self.fit.residual(self.all(unknowns))
+
+    def all(self, unknowns: Float[Array, " u"]) -> Float[Array, " d"]:
+        """All parameters."""
+        return self.x.at[self.place].set(unknowns)
 
 
 def recorded(robot: Robot, duration: float, noise: float, seed: int) -> Trajectory:
-    """A motion, and MuJoCo's torques along it for the arm without friction."""
-    model = mujoco.MjModel.from_xml_path(str(irb140_path()))
-    model.dof_frictionloss[:] = 0.0
-    model.dof_damping[:] = 0.0
+    """A motion, and MuJoCo's torques along it."""
+    model = mujoco.MjModel.from_xml_string(mjcf(robot))
     played = fourier_motion(robot, duration=duration, rate=100.0, seed=seed)
     data, tau = mujoco.MjData(model), np.empty_like(played.q)
     for k, (q, qd, qdd) in enumerate(zip(played.q, played.qd, played.qdd, strict=True)):
@@ -94,39 +116,40 @@ class BoxedResidual(eqx.Module):
     Uniform in the box means a standard deviation of its width / sqrt(12).
     """
 
-    fit: identify.LinearFit
-    lower: Float[Array, " d"]
-    upper: Float[Array, " d"]
+    aim: Unknowns
+    lower: Float[Array, " u"]
+    upper: Float[Array, " u"]
 
-    def __call__(self, x: Float[Array, " d"]) -> Float[Array, " r"]:
-        noise = jnp.sqrt(self.fit.rest / self.fit.rows)
+    def __call__(self, x: Float[Array, " u"]) -> Float[Array, " r"]:
+        noise = jnp.sqrt(self.aim.fit.rest / self.aim.fit.rows)
         apart = (x - 0.5 * (self.lower + self.upper)) / (self.upper - self.lower) * 12.0**0.5
-        return jnp.concatenate([self.fit.residual(x), noise * apart])
+        return jnp.concatenate([self.aim.residual(x), noise * apart])
 
 
-def ways(fit: identify.LinearFit, lower, upper, config: Config) -> dict[str, Callable[[], Float[Array, "s m"]]]:
+def ways(aim: Unknowns, lower, upper, config: Config) -> dict[str, Callable[[], Float[Array, "s m"]]]:
     """Every way to estimate, as functions that give inertial parameters (s, 10 k)."""
-    keys = swarm.seed_keys(config.seeds)
+    keys, fit = swarm.seed_keys(config.seeds), aim.fit
     size: dict[str, Any] = {"particles": 12, "iterations": 10} if config.smoke else {}
-    phi = jax.jit(jax.vmap(lambda x: identify.phi_of(x, fit.mass).ravel()))
+    phi = jax.jit(jax.vmap(lambda u: identify.phi_of(aim.all(u), fit.mass).ravel()))
     starts = lower + (upper - lower) * jax.random.uniform(jax.random.key(1), (config.seeds, len(lower)))
     scale = jnp.abs(upper - lower)
     middle = 0.5 * (lower + upper)
-    numbers = _possible_numbers(starts, middle, fit.mass)
+    numbers = _possible_numbers(jax.vmap(aim.all)(starts), aim.all(middle), fit.mass)
 
     def possible() -> Float[Array, "s m"]:
         found = identify.descents(PossibleResidual(fit), numbers, max_steps=100).x
-        return phi(jax.vmap(identify.consistent_parameters, (0, None))(found, fit.mass))
+        x = jax.vmap(identify.consistent_parameters, (0, None))(found, fit.mass)
+        return jax.vmap(lambda x: identify.phi_of(x, fit.mass).ravel())(x)
 
     found = {
-        name: lambda r=r: phi(swarm.minimise(fit, r, lower, upper, keys=keys, **size).x) for name, r in swarms().items()
+        name: lambda r=r: phi(swarm.minimise(aim, r, lower, upper, keys=keys, **size).x) for name, r in swarms().items()
     }
     return found | {
-        "Levenberg-Marquardt": lambda: phi(identify.descents(fit.residual, starts, scale=scale, max_steps=100).x),
+        "Levenberg-Marquardt": lambda: phi(identify.descents(aim.residual, starts, scale=scale, max_steps=100).x),
         "Levenberg-Marquardt, box as prior": lambda: phi(
-            identify.descents(BoxedResidual(fit, lower, upper), starts, scale=scale, max_steps=100).x
+            identify.descents(BoxedResidual(aim, lower, upper), starts, scale=scale, max_steps=100).x
         ),
-        "BFGS": lambda: phi(identify.descents(fit.residual, starts, "bfgs", scale=scale, max_steps=200).x),
+        "BFGS": lambda: phi(identify.descents(aim.residual, starts, "bfgs", scale=scale, max_steps=200).x),
         "Levenberg-Marquardt, possible bodies": possible,
         "least squares, base parameters": lambda: identify.nearest_least_squares(fit, phi(middle[None])[0])[None],
     }
@@ -140,23 +163,24 @@ def _possible_numbers(starts, middle, mass) -> Float[Array, "s d"]:
     return jnp.where(jnp.isfinite(numbers).all(axis=1, keepdims=True), numbers, plain)
 
 
-def run(config: Config) -> dict:
+def run(config: Config, study: StudyArm) -> dict:
     """All ways on one recording, judged on another."""
-    zero = jnp.zeros(6)
-    robot = eqx.tree_at(lambda r: (r.damping, r.frictionloss), irb140(), (zero, zero))
-    truth = identify.link_parameters(robot, LINKS)
-    place = jnp.asarray(np.random.default_rng(0).uniform(size=truth.shape))
-    lower, upper = identify.box(truth, config.width, place=place)
+    robot, links = study.whole, study.links
+    place = jnp.asarray(np.flatnonzero(study.searched))
+    where = jnp.asarray(np.random.default_rng(0).uniform(size=study.x.shape))
+    lower, upper = (end[place] for end in identify.box(study.x, config.width, place=where))
     duration = 3.0 if config.smoke else config.duration
-    fit = identify.linear_fit(robot, LINKS, recorded(robot, duration, config.noise, seed=1))
-    unseen = identify.linear_fit(robot, LINKS, recorded(robot, duration, 0.0, seed=2))
-    rows = [_row(name, way, fit, unseen, truth) for name, way in ways(fit, lower, upper, config).items()]
-    middle = identify.phi_of(0.5 * (lower + upper), fit.mass).ravel()
-    bounds = {"middle of the box": float(unseen.of_phi(middle)), "noise": float(fit.of_phi(robot.phi[:3].ravel()))}
+    fit = identify.linear_fit(robot, links, recorded(robot, duration, config.noise, seed=1))
+    unseen = identify.linear_fit(robot, links, recorded(robot, duration, 0.0, seed=2))
+    aim = Unknowns(fit, study.x, place)
+    rows = [_row(name, way, fit, unseen, study) for name, way in ways(aim, lower, upper, config).items()]
+    middle = identify.phi_of(aim.all(0.5 * (lower + upper)), fit.mass).ravel()
+    truth = identify.phi_of(study.x, fit.mass).ravel()
+    bounds = {"middle of the box": float(unseen.of_phi(middle)), "noise": float(fit.of_phi(truth))}
     return {"bounds": bounds, "rows": rows}
 
 
-def _row(name: str, way: Callable, fit: identify.LinearFit, unseen: identify.LinearFit, truth) -> dict:
+def _row(name: str, way: Callable, fit: identify.LinearFit, unseen: identify.LinearFit, study: StudyArm) -> dict:
     """Held-out error of the run that fits best, and of all; time with and without compiling."""
     seconds = []
     for _ in range(2):
@@ -166,7 +190,7 @@ def _row(name: str, way: Callable, fit: identify.LinearFit, unseen: identify.Lin
     seen, held_out = (np.asarray(jax.vmap(f.of_phi)(phi)) for f in (fit, unseen))
     best = int(np.argmin(np.where(np.isnan(seen), np.inf, seen)))
     x = np.asarray(jax.vmap(_parameters)(phi))
-    com, inertia = identify.mape(x, np.asarray(truth))
+    com, inertia = study.mape(x)
     mass = phi.reshape(len(phi), -1, 10)[:, :, 0]
     possible = jax.vmap(identify.consistency)(jnp.asarray(x), mass).pseudo_inertia
     return {
@@ -199,16 +223,17 @@ def page(result: dict) -> str:
     return f"# Torque instead of known answers\n\n{bounds}\n\n{head}\n" + "|---" * 9 + "|\n" + "\n".join(lines) + "\n"
 
 
-def main() -> None:
-    config = tyro.cli(Config)
+def main(config: Config) -> None:
+    """Estimate, judge, write."""
+    set_up_compilation_cache()
     config = dataclasses.replace(config, seeds=2) if config.smoke else config
-    result = run(config) | {"config": {k: str(v) for k, v in dataclasses.asdict(config).items()}}
-    config.out.mkdir(parents=True, exist_ok=True)
-    stem = "torque_swarms_smoke" if config.smoke else "torque_swarms"
-    (config.out / f"{stem}.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    (config.out / f"{stem}.md").write_text(page(result), encoding="utf-8")
+    study = config.arm()
+    result = {"config": config.said(), "arm": study.name} | run(config, study)
+    folder = config.folder(study)
+    (folder / "torque_swarms.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    (folder / "torque_swarms.md").write_text(page(result), encoding="utf-8")
     print(page(result))
 
 
 if __name__ == "__main__":
-    main()
+    main(tyro.cli(Config))

@@ -13,6 +13,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "experiments"))
 
 import study_readings  # noqa: E402
+import table3_report  # noqa: E402
 import table3_swarms  # noqa: E402
 
 
@@ -37,14 +38,15 @@ def test_every_choice_that_the_text_leaves_open_is_tried():
 def test_the_published_row_is_at_distance_zero():
     published = study_readings.PUBLISHED["pso"]
     row = {"com": [published["com"]], "inertia": [published["inertia"]], "plateau": published["plateau"]}
-    assert table3_swarms.distance(row, "pso") == 0.0
-    assert table3_swarms.distance(row | {"plateau": 54}, "pso") == pytest.approx(math.log(2.0) / math.sqrt(3.0))
+    assert table3_report.distance(row, "pso") == 0.0
+    assert table3_report.distance(row | {"plateau": 54}, "pso") == pytest.approx(math.log(2.0) / math.sqrt(3.0))
 
 
 def test_the_same_reading_gives_the_same_row():
     reading = study_readings.Reading("qpso", "w 0.99 to 0.4", 0.05)
     size = {"particles": 10, "iterations": 6, "seeds": 3}
-    first, second = (table3_swarms.judged(reading, size) for _ in range(2))
+    arm = table3_swarms.Config().arm()
+    first, second = (table3_swarms.judged(reading, arm, size) for _ in range(2))
     assert first == second
 
 
@@ -55,12 +57,12 @@ def test_the_table_is_made_whole_and_goes_on_where_it_stopped(tmp_path):
     run = lambda: subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, timeout=300)  # noqa: E731
     first = run()
     assert first.returncode == 0, first.stderr
-    lines = (tmp_path / "table3_swarms_smoke.jsonl").read_text().splitlines()
-    table = json.loads((tmp_path / "table3_swarms_smoke.json").read_text())
+    lines = (tmp_path / "table3_swarms.jsonl").read_text().splitlines()
+    table = json.loads((tmp_path / "table3_swarms.json").read_text())
     assert len(table["readings"]) == len(lines)
     assert max(row["com"] for row in table["baselines"]) < 1e-10  # [%] one linear solve
     assert sorted(path.name for path in (tmp_path / "figures").iterdir()) == [f"figure{k}.svg" for k in (6, 7, 8, 9)]
     # Interrupted after three readings, it adds the others and ends at the same table.
-    (tmp_path / "table3_swarms_smoke.jsonl").write_text("\n".join(lines[:3]) + "\n")
+    (tmp_path / "table3_swarms.jsonl").write_text("\n".join(lines[:3]) + "\n")
     assert run().returncode == 0
-    assert json.loads((tmp_path / "table3_swarms_smoke.json").read_text())["readings"] == table["readings"]
+    assert json.loads((tmp_path / "table3_swarms.json").read_text())["readings"] == table["readings"]

@@ -6,21 +6,26 @@ import numpy as np
 from scipy import stats
 
 
-def mape(x: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def mape(
+    x: np.ndarray, reference: np.ndarray, counted: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Mean absolute percentage error of centres of mass and of inertias, 100/n sum |x_i/x_ref,i - 1|.
 
     Args:
         x: Estimates, shape (s, d), see `link_parameters`.
         reference: Shape (d,).
+        counted: Which entries count, shape (d,); default all.  One that is zero in the reference has no percentage.
 
     Returns:
         Of the centres of mass and of the inertias [%], shape (s,) each.
 
     Source: the study's equation 30.
     """
-    error = 100.0 * np.abs(np.asarray(x) / np.asarray(reference) - 1.0)
-    third = error.shape[-1] // 3
-    return error[..., :third].mean(axis=-1), error[..., third:].mean(axis=-1)
+    reference = np.asarray(reference)
+    chosen = np.ones(reference.shape, bool) if counted is None else np.asarray(counted)
+    error = 100.0 * np.abs(np.asarray(x)[..., chosen] / reference[chosen] - 1.0)
+    centres = int(np.count_nonzero(chosen[: len(reference) // 3]))
+    return error[..., :centres].mean(axis=-1), error[..., centres:].mean(axis=-1)
 
 
 def plateau(best: np.ndarray, remaining: float = 0.01) -> int:

@@ -5,6 +5,8 @@ from irb140_jax.kinematics.dh import DHTable as DHTable
 from irb140_jax.kinematics.dh import dh_forward as dh_forward
 from irb140_jax.kinematics.dh import dh_transform as dh_transform
 from irb140_jax.kinematics.dh import irb140_end_point as irb140_end_point
+from irb140_jax.kinematics.dh_of import DHView as DHView
+from irb140_jax.kinematics.dh_of import dh_of as dh_of
 from irb140_jax.kinematics.forward import axis_rotation as axis_rotation
 from irb140_jax.kinematics.forward import forward_kinematics as forward_kinematics
 from irb140_jax.kinematics.forward import link_frames as link_frames

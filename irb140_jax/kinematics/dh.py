@@ -11,19 +11,21 @@ Number = Scalar | np.ndarray | float
 
 
 class DHTable(eqx.Module):
-    """Standard (distal) Denavit-Hartenberg parameters of n hinges.
+    """Standard (distal) Denavit-Hartenberg parameters of n hinges and slides.
 
     Attributes:
-        offset: Added to the joint position to give theta [rad], shape (n,).
-        d: Shift along the joint's axis [m], shape (n,).
+        offset: theta at joint position zero [rad], shape (n,); a hinge adds its position.
+        d: Shift along the joint's axis at joint position zero [m], shape (n,); a slide adds its position.
         a: Shift along the common normal [m], shape (n,).
         alpha: Twist about the common normal [rad], shape (n,).
+        slide: 1 for a slide, 0 for a hinge, shape (n,); default all hinges.
     """
 
     offset: Float[Array | np.ndarray, " n"]
     d: Float[Array | np.ndarray, " n"]
     a: Float[Array | np.ndarray, " n"]
     alpha: Float[Array | np.ndarray, " n"]
+    slide: Float[Array | np.ndarray, " n"] | None = None
 
 
 # ABB IRB 140, maker's joint signs: at zero the upper arm is upright (theta2* = theta2 - 90 deg), the forearm level.
@@ -65,7 +67,7 @@ def dh_forward(table: DHTable, q: Joints) -> Pose:
 
     Args:
         table: The arm's parameters.
-        q: Joint positions [rad], shape (n,).
+        q: Joint positions [rad or m], shape (n,).
 
     Returns:
         The pose, shape (4, 4).
@@ -73,8 +75,10 @@ def dh_forward(table: DHTable, q: Joints) -> Pose:
     Source: equation 2 of the study, multiplied out along the chain.
     """
     T = jnp.eye(4)
+    slide = np.zeros(q.shape[0]) if table.slide is None else table.slide
     for i in range(q.shape[0]):
-        T = T @ dh_transform(q[i] + table.offset[i], table.d[i], table.a[i], table.alpha[i])
+        turned, pushed = (1.0 - slide[i]) * q[i], slide[i] * q[i]
+        T = T @ dh_transform(table.offset[i] + turned, table.d[i] + pushed, table.a[i], table.alpha[i])
     return T
 
 

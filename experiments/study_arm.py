@@ -1,0 +1,153 @@
+"""The arm a table is made for: which robot, which of its links are identified, and what a set of estimates makes of it.
+
+The study takes the first three links of the IRB 140; any other arm, and any number of its links, may take their place.
+"""
+
+import dataclasses
+import pathlib
+import re
+from functools import cached_property
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from irb140_jax import identify
+from irb140_jax.errors import InputError
+from irb140_jax.robot import Robot, first_joints, irb140, load_robot
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+RESULTS, FIGURES = ROOT / "results", ROOT / "docs" / "figures"
+JOINTS_OF_THE_STUDY = 3
+# Share of the link's largest value below which an entry is zero: round-off of the file reader's principal axes.
+ROUND_OFF = 1e-9
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmChoice:
+    """Which arm.
+
+    Attributes:
+        robot: Model file, MJCF or URDF; default the IRB 140.
+        joints: Its first joints and links that take part; default three of the IRB 140, all of another arm.
+    """
+
+    robot: pathlib.Path | None = None
+    joints: int | None = None
+
+    def arm(self) -> "StudyArm":
+        """The arm, read from its file."""
+        whole = irb140() if self.robot is None else load_robot(self.robot)
+        count = self.joints or (min(JOINTS_OF_THE_STUDY, whole.n) if self.robot is None else whole.n)
+        if not 1 <= count <= whole.n:
+            raise InputError(f"{count} joints of robot '{whole.name}': give 1 to {whole.n}")
+        zero = jnp.zeros(whole.n)
+        fields = lambda r: (r.damping, r.frictionloss, r.stiffness)  # noqa: E731
+        return StudyArm(eqx.tree_at(fields, whole, (zero, zero, zero)), tuple(range(count)), self.robot is None)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StudyArm:
+    """A rigid arm and the links whose parameters are sought; masses are known, as in the study.
+
+    Attributes:
+        whole: The robot, without friction or springs, of which the study knows none.
+        links: Whose centres of mass and inertias are unknown.
+        shipped: Whether it is the IRB 140.
+    """
+
+    whole: Robot
+    links: tuple[int, ...]
+    shipped: bool
+
+    @property
+    def is_studys(self) -> bool:
+        """Whether it is what the study identified: its published figures then stand beside ours."""
+        return self.shipped and len(self.links) == JOINTS_OF_THE_STUDY
+
+    @property
+    def name(self) -> str:
+        """For titles."""
+        part = "" if len(self.links) == self.whole.n else f", first {len(self.links)} joints"
+        return f"{self.whole.name}{part}"
+
+    @property
+    def slug(self) -> str:
+        """For folders."""
+        return f"{re.sub(r'[^A-Za-z0-9]+', '_', self.whole.name).strip('_').lower()}_{len(self.links)}_joints"
+
+    @cached_property
+    def x(self) -> Float[Array, " d"]:
+        """True parameters, see `identify.link_parameters`."""
+        return identify.link_parameters(self.whole, self.links)
+
+    @cached_property
+    def mass(self) -> Float[Array, " k"]:
+        """Masses of the links [kg]."""
+        return self.whole.mass[jnp.array(self.links)]
+
+    @cached_property
+    def searched(self) -> np.ndarray:
+        """Which of x are unknowns, shape (d,): a box relative to zero, or a percentage of it, has no meaning."""
+        k = len(self.links)
+        com, inertia = np.abs(np.asarray(self.x[: 3 * k]).reshape(k, 3)), np.abs(np.asarray(self.x[3 * k :]))
+        by_link = (com, inertia.reshape(k, 6))
+        return np.concatenate([(v > ROUND_OFF * v.max(axis=1, keepdims=True)).ravel() for v in by_link])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the entries of x: cx1 ... Izz3."""
+        links = [i + 1 for i in self.links]
+        elements = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+        return tuple([f"c{a}{i}" for i in links for a in "xyz"] + [f"{e}{i}" for i in links for e in elements])
+
+    def full(self, unknowns: Float[Array, "*s u"]) -> Float[Array, "*s d"]:
+        """x with these unknowns; what is not sought as it is."""
+        place = jnp.asarray(np.flatnonzero(self.searched))
+        every = jnp.broadcast_to(self.x, (*unknowns.shape[:-1], self.x.shape[0]))
+        return every.at[..., place].set(unknowns)
+
+    def mape(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Equation 30 of estimates (s, d), over the unknowns."""
+        return identify.mape(x, np.asarray(self.x), self.searched)
+
+    def reduced(self, x: Float[Array, " d"] | None = None) -> Robot:
+        """The first joints with these parameters, or the true ones; what lies beyond counts to the last link."""
+        robot = self.whole if x is None else identify.with_link_parameters(self.whole, self.links, x)
+        return first_joints(robot, len(self.links))
+
+
+@dataclasses.dataclass(frozen=True)
+class StudyConfig(ArmChoice):
+    """What every part of the study is told.
+
+    Attributes:
+        out: Folder of the results; default results/, and a folder in it for another arm or a smoke run.
+        figures: Folder of the figures; default docs/figures for the study's arm, else within the results.
+        smoke: Everything as small as can be, to see that all works.
+    """
+
+    out: pathlib.Path | None = None
+    figures: pathlib.Path | None = None
+    smoke: bool = False
+
+    def folder(self, arm: StudyArm) -> pathlib.Path:
+        """Where results go; it is made."""
+        usual = RESULTS if arm.is_studys else RESULTS / arm.slug
+        path = self.out or (RESULTS / "smoke" if self.smoke else usual)
+        path.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def figure_folder(self, arm: StudyArm) -> pathlib.Path:
+        """Where figures go; it is made."""
+        beside = self.folder(arm) / "figures"
+        path = self.figures or (FIGURES if arm.is_studys and not self.smoke and self.out is None else beside)
+        path.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def said(self) -> dict[str, str | int | float | bool | None]:
+        """The choices that a result depends on, to be stored beside it."""
+        places = ("out", "figures")
+        told = {name: value for name, value in vars(self).items() if name not in places}
+        return {name: str(value) if isinstance(value, pathlib.Path) else value for name, value in told.items()}
