@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from irb140_jax import effects as effects
     from irb140_jax import identify as identify
     from irb140_jax import kinematics as kinematics
+    from irb140_jax import learned as learned
     from irb140_jax import mismatch as mismatch
     from irb140_jax import oracle as oracle
     from irb140_jax import recordings as recordings
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
     from irb140_jax.robot import load_robot as load_robot
 
 _SUBPACKAGES = (
-    "control", "dynamics", "effects", "identify", "kinematics", "mismatch", "oracle", "recordings", "report", "robot",
-    "simulate", "swarm",
+    "control", "dynamics", "effects", "identify", "kinematics", "learned", "mismatch", "oracle", "recordings", "report",
+    "robot", "simulate", "swarm",
 )
 _FROM_ROBOT = ("Robot", "load_robot")
 __all__ = [*_SUBPACKAGES, *_FROM_ROBOT]  # pyright: ignore[reportUnsupportedDunderAll]

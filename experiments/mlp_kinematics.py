@@ -1,0 +1,262 @@
+"""The study's network for the kinematics: position error beside 0.48 and 0.61 mm, and what the penalty does; figure 12.
+
+    python experiments/mlp_kinematics.py [--smoke] [--out results] [--figures docs/figures]
+
+Every reading of the text is a case.  A case's training is saved every few epochs in results/mlp_kinematics/ and its
+figures there when it is done, so an interrupted run goes on where it stopped.  Writes results/mlp_kinematics.json and
+.md, and figure12.svg.
+"""
+
+import dataclasses
+import json
+import pathlib
+import time
+from typing import Any, Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import tyro
+from mlp_report import figure12, page
+
+from irb140_jax import learned
+from irb140_jax.compilation_cache import set_up_compilation_cache
+from irb140_jax.robot import Robot, first_joints, irb140
+
+SAMPLES, VALIDATION = 40_000, 10_000
+# Samples of the second stage: 24,000 residuals for 353 weights.
+REFINED_WITH = 8_000
+# Epochs between two savings: some ten seconds.
+CHUNK = 25
+# Joint positions [deg] that the samples are spread over.
+REGIONS = {
+    # In front of the robot, where it works; the text says no more of where than "executing physical tasks".
+    "task": ([-90.0, -30.0, -45.0], [90.0, 60.0, 30.0]),
+    # Between the joint limits, all around.
+    "whole": ([-180.0, -90.0, -230.0], [180.0, 110.0, 50.0]),
+    # One branch of the inverse up to its ends: arm stretched at q3 = -90, tool over joint 1's axis at the other.
+    "branch": ([-90.0, 20.0, -90.0], [90.0, 100.0, 45.0]),
+}
+HIDDEN = {
+    "1 x 50": learned.ONE_LAYER_50,
+    "4 x 122": learned.FOUR_LAYERS_488_TOTAL,
+    "4 x 488": learned.FOUR_LAYERS_488_EACH,
+}
+# Bins of the condition number (2-norm) of the pose asked for.
+BINS = (1.0, 5.0, 10.0, 20.0, 50.0, np.inf)
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """What to run and where to write.
+
+    Attributes:
+        out: Folder of the results.
+        figures: Folder of the figure.
+        smoke: Few samples and epochs, to see that all works.
+    """
+
+    out: pathlib.Path = pathlib.Path("results")
+    figures: pathlib.Path = pathlib.Path("docs/figures")
+    smoke: bool = False
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        """For training and for validation."""
+        return (400, 200) if self.smoke else (SAMPLES, VALIDATION)
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """One reading of the text.
+
+    Attributes:
+        direction: "forward", joints to position, or "inverse".
+        region: One of `REGIONS`.
+        hidden: One of `HIDDEN`.
+        epochs: Longest training; chosen by what a core does in a minute or two.
+        batch: Samples per step.
+        velocities: Whether velocities are inputs, too.
+        loss: "mse" as section 3, or "mae" as equation 33.
+        penalty: Form of the penalty of equation 33, or "none".
+        weight: Of the penalty [m].
+        rate: Of learning at the start.
+        refined: Steps of Levenberg-Marquardt afterwards, which the text does not name.
+    """
+
+    direction: learned.Direction
+    region: str
+    hidden: str
+    epochs: int
+    batch: int = 500
+    velocities: bool = False
+    loss: learned.Loss = "mse"
+    penalty: learned.Form | Literal["none"] = "none"
+    weight: float = 0.0
+    rate: float = 0.01
+    refined: int = 0
+
+    def __str__(self) -> str:
+        parts = [self.direction, self.region, self.hidden]
+        parts += ["with velocities"] * self.velocities + ["MAE"] * (self.loss == "mae")
+        parts += ["then Levenberg-Marquardt"] * bool(self.refined)
+        return ", ".join(parts + [f"{self.penalty} penalty {self.weight:g}"] * (self.penalty != "none"))
+
+    @property
+    def settings(self) -> learned.Settings:
+        """How to train."""
+        return learned.Settings(epochs=self.epochs, batch=self.batch, rate=self.rate)
+
+    def task(self, robot: Robot) -> learned.Task:
+        """What is asked."""
+        weight = jnp.asarray(self.weight)
+        penalty = None if self.penalty == "none" else learned.ConditionPenalty(weight, form=self.penalty)
+        return learned.Task(robot, penalty, self.direction, self.velocities, self.loss)
+
+
+NEAR_SINGULAR = Case("inverse", "branch", "4 x 122", 80, loss="mae")
+CASES = (
+    Case("forward", "task", "1 x 50", 1500, 250),
+    Case("forward", "task", "1 x 50", 200, 250, refined=200),
+    Case("inverse", "task", "1 x 50", 200, 250, refined=200),
+    Case("forward", "task", "4 x 122", 600, 1000),
+    NEAR_SINGULAR,
+    dataclasses.replace(NEAR_SINGULAR, penalty="log", weight=1e-3),
+    dataclasses.replace(NEAR_SINGULAR, penalty="log", weight=1e-2),
+    dataclasses.replace(NEAR_SINGULAR, penalty="hinge", weight=1e-3),
+    dataclasses.replace(NEAR_SINGULAR, penalty="sigmoid", weight=1e-2),
+    Case("inverse", "task", "4 x 122", 300, 500),
+    Case("forward", "task", "1 x 50", 400, 250, velocities=True),
+    Case("forward", "whole", "4 x 122", 200, 500),
+    # At a rate of 0.01 layers as wide as these are thrown out of the workspace by the first steps.
+    Case("forward", "task", "4 x 488", 15, 250, rate=1e-3),
+)
+
+
+def samples_of(config: Config, case: Case, robot: Robot) -> tuple[learned.Samples, learned.Samples]:
+    """Samples to learn from, and others to validate with."""
+    low, high = (jnp.radians(jnp.array(end)) for end in REGIONS[case.region])
+    keys = jax.random.split(jax.random.key(sorted(REGIONS).index(case.region)))
+    counts = config.samples
+    first, second = (learned.joint_samples(robot, low, high, n, key=k) for n, k in zip(counts, keys, strict=True))
+    return first, second
+
+
+def trained(config: Config, case: Case, folder: pathlib.Path) -> dict:
+    """One row; what an earlier run saved of it is taken up."""
+    robot = first_joints(irb140(), 3)
+    task, settings = case.task(robot), case.settings._replace(epochs=4) if config.smoke else case.settings
+    parts = samples_of(config, case, robot)
+    state = learned.begin(task.network(parts[0], HIDDEN[case.hidden], key=jax.random.key(0)), settings)
+    # Epochs after the end stay NaN.
+    progress: Any = state, np.full((settings.epochs + CHUNK, len(learned.Curve._fields)), np.nan), np.zeros(1)
+    saved = folder / f"{str(case).replace(' ', '_').replace(',', '')}.eqx"
+    if saved.exists():
+        progress = eqx.tree_deserialise_leaves(saved, progress)
+    while not bool(progress[0].stopped(settings)):
+        progress = _chunk(task, parts, settings, *progress)
+        eqx.tree_serialise_leaves(saved, progress)
+    state, curve, seconds = progress
+    started = time.process_time()
+    network, errors = _refined(task, parts, state.best, min(case.refined, 3) if config.smoke else case.refined)
+    row = judged(task, network, *parts)
+    row |= {"epochs": int(state.epoch), "seconds": _round(float(seconds[0]) + time.process_time() - started)}
+    saved.unlink()
+    return {"name": str(case), "case": dataclasses.asdict(case), **row, "curve": thinned(curve), "refinement": errors}
+
+
+def _chunk(task, parts, settings: learned.Settings, state: learned.State, curve: np.ndarray, seconds: np.ndarray):
+    """Some more epochs."""
+    started, done = time.process_time(), int(state.epoch)
+    state, more = learned.train(state, task, parts[0], parts[1], settings, CHUNK, key=jax.random.key(1))
+    curve[done : done + CHUNK] = np.stack(more, axis=1)
+    print(f"  epoch {int(state.epoch)}, best {1e3 * float(state.best_error):.3f} mm", flush=True)
+    return state, curve, seconds + time.process_time() - started
+
+
+def _refined(task, parts, network: learned.KinematicMlp, steps: int) -> tuple[learned.KinematicMlp, list[float]]:
+    """The second stage, and its errors on validation [m]; on a part of the samples, as they are many per weight."""
+    state, errors = learned.begin_refinement(network), []
+    if not steps:
+        return network, errors
+    part = jax.tree.map(lambda x: x[:REFINED_WITH], parts[0])
+    while len(errors) < steps:
+        state, more = learned.refine(state, task, part, parts[1], min(CHUNK, steps))
+        errors += [_round(float(x)) for x in more]
+        print(f"  step {len(errors)}, {1e3 * errors[-1]:.3f} mm", flush=True)
+    return state.network, errors
+
+
+def judged(task: learned.Task, network: learned.KinematicMlp, *parts: learned.Samples) -> dict:
+    """Errors [mm] on training and validation; of an inverse, what it does near singular poses."""
+    weights = sum(x.size for x in jax.tree.leaves(eqx.filter(network.layers, eqx.is_array)))
+    row: dict = {"weights": weights}
+    for name, samples in zip(("training", "validation"), parts, strict=True):
+        error = 1e3 * np.asarray(eqx.filter_jit(learned.position_errors)(task, network, samples))
+        row |= {name: _round(error.mean()), f"{name}_p95": _round(np.percentile(error, 95))}
+    if task.direction == "inverse":
+        row["bins"] = binned(learned.manners(task, network, parts[1]))
+    return row
+
+
+def binned(manners: learned.Manners) -> list[dict]:
+    """Means and 95th percentiles by the condition number of the pose that was asked for."""
+    asked = np.asarray(manners.asked)
+    rows = []
+    for low, high in zip(BINS, BINS[1:], strict=False):
+        inside = (asked >= low) & (asked < high)
+        if not inside.any():
+            continue
+        pick = {name: np.asarray(x)[inside] for name, x in manners._asdict().items()}
+        high95 = {f"{name}_p95": _round(np.percentile(pick[name], 95)) for name in pick if name != "error"}
+        millimetres = 1e3 * pick["error"]
+        error = {"error": _round(millimetres.mean()), "error_p95": _round(np.percentile(millimetres, 95))}
+        bounds = {"from": low, "to": high if np.isfinite(high) else None, "samples": int(inside.sum())}
+        rows.append(bounds | error | high95)
+    return rows
+
+
+def thinned(curve: np.ndarray, points: int = 200) -> dict[str, list]:
+    """At most so many epochs of a curve, for the figure."""
+    epochs = np.flatnonzero(np.isfinite(curve[:, 0]))
+    epochs = epochs[:: -(-len(epochs) // points)]
+    columns = {name: [_round(x) for x in curve[epochs, i]] for i, name in enumerate(learned.Curve._fields)}
+    return {"epoch": [int(e) + 1 for e in epochs]} | columns
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def run(config: Config) -> list[dict]:
+    """Train the cases that the file of results lacks; all rows."""
+    folder = config.out / ("mlp_kinematics_smoke" if config.smoke else "mlp_kinematics")
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "cases.jsonl"
+    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    done = {row["name"] for row in rows}
+    cases = (CASES[1], CASES[6]) if config.smoke else CASES
+    for number, case in enumerate(cases):
+        if str(case) in done:
+            continue
+        print(f"{number + 1}/{len(cases)} {case}", flush=True)
+        rows.append(trained(config, case, folder))
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(rows[-1]) + "\n")
+    return sorted(rows, key=lambda row: [str(case) for case in CASES].index(row["name"]))
+
+
+def main() -> None:
+    config = tyro.cli(Config)
+    set_up_compilation_cache()
+    rows = run(config)
+    stem = "mlp_kinematics_smoke" if config.smoke else "mlp_kinematics"
+    (config.out / f"{stem}.json").write_text(json.dumps({"cases": rows}) + "\n", encoding="utf-8")
+    (config.out / f"{stem}.md").write_text(page(rows), encoding="utf-8")
+    figure12(rows, config.figures)
+    print(page(rows))
+
+
+if __name__ == "__main__":
+    main()
