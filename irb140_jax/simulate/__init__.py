@@ -1,5 +1,6 @@
 """Motion of an arm under control."""
 
+from irb140_jax.sharding import sweep as sweep
 from irb140_jax.simulate.disturbance import AbstractDisturbance as AbstractDisturbance
 from irb140_jax.simulate.disturbance import SinusoidalTorque as SinusoidalTorque
 from irb140_jax.simulate.disturbance import no_disturbance as no_disturbance

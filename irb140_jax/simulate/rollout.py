@@ -30,7 +30,7 @@ def rollout(
 ) -> Trajectory:
     """Motion of the plant under its controller, qdd = M^-1 (tau + d - C qd - g - passive), at fixed steps.
 
-    To run many at once, `jax.vmap` a function of what differs (inertials, gains, starts, disturbances) with the rest
+    To run many at once, `sweep` a function of what differs (inertials, gains, starts, disturbances) with the rest
     closed over; the robot's geometry must be concrete where this function is called, or it compiles to slower code.
 
     Args:

@@ -1,7 +1,6 @@
 """Run swarms: seeds x particles x iterations as one compiled scan over one batched array."""
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -9,10 +8,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jax.sharding import Mesh, NamedSharding, PartitionSpec
+from jax.sharding import Mesh
 from jaxtyping import Array, Float, Key
 
 from irb140_jax.errors import InputError
+from irb140_jax.sharding import sweep
 from irb140_jax.swarm.base import Clock, History, Rule, Swarm, recorded
 from irb140_jax.swarm.draws import Draws, Generator
 from irb140_jax.swarm.stored import stored
@@ -70,17 +70,11 @@ def minimise(
         The minima, one a seed.
 
     Raises:
-        InputError: The box is empty or of the wrong shape, or there are too few particles, iterations or seeds.
+        InputError: The box is empty or of the wrong shape, there are too few particles, iterations or seeds, or the
+            devices can't share the seeds evenly.
     """
     lower, upper = _checked(lower, upper, particles, iterations)
-    run = partial(_run, particles=particles, iterations=iterations, generator=generator)
-    if mesh is None:
-        return run(objective, rule, lower, upper, keys)
-    axis, devices = mesh.axis_names[0], mesh.devices.shape[0]
-    if len(keys) % devices:
-        raise InputError(f"{len(keys)} seeds on {devices} devices: give a multiple of {devices} keys, or another mesh")
-    problem = eqx.filter_shard((objective, rule, lower, upper), NamedSharding(mesh, PartitionSpec()))
-    return _run_on(mesh, axis, run, problem, jax.device_put(keys, NamedSharding(mesh, PartitionSpec(axis))))
+    return sweep(_one_seed, keys, objective, rule, lower, upper, particles, iterations, generator, mesh=mesh)
 
 
 def _checked(lower: Any, upper: Any, particles: int, iterations: int) -> tuple[Array, Array]:
@@ -96,22 +90,7 @@ def _checked(lower: Any, upper: Any, particles: int, iterations: int) -> tuple[A
     return jnp.asarray(low), jnp.asarray(high)
 
 
-@eqx.filter_jit
-def _run(objective, rule, lower, upper, keys, *, particles: int, iterations: int, generator: Generator) -> Minima:
-    one = partial(_one_seed, objective, rule, lower, upper, particles, iterations, generator)
-    return jax.vmap(one)(keys)
-
-
-@eqx.filter_jit
-def _run_on(mesh: Mesh, axis: str, run, problem, keys) -> Minima:
-    arrays, static = eqx.partition(problem, eqx.is_array)
-    body = lambda arrays, keys: run(*eqx.combine(arrays, static), keys)  # noqa: E731
-    seeds = PartitionSpec(axis)
-    shared = jax.shard_map(body, mesh=mesh, in_specs=(PartitionSpec(), seeds), out_specs=seeds, check_vma=False)
-    return shared(arrays, keys)  # every swarm minds its own business, so nothing is exchanged
-
-
-def _one_seed(objective, rule: Rule, lower, upper, particles: int, iterations: int, generator: Generator, key):
+def _one_seed(key, objective, rule: Rule, lower, upper, particles: int, iterations: int, generator: Generator):
     """Algorithms 1 and 2 for one swarm."""
 
     def evaluated(swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
