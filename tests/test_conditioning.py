@@ -54,11 +54,12 @@ def test_derivatives_of_sines_well_inside_the_band_are_right_to_a_hundredth(freq
 def test_derivatives_of_parabolas_are_exact():
     t = times()
     r = condition(logged(t, 0.3 - 0.7 * t + 0.45 * t**2), BAND)
-    # At the log's own samples, where nothing is interpolated: rounding, differentiated twice.
+    # At the log's own samples, where nothing is interpolated: rounding, differentiated twice; and at frequencies where
+    # the parabola's power is below rounding it counts as noise.
     at_samples = np.isclose((r.t * RATE) % 1.0, 0.0, atol=1e-6) | np.isclose((r.t * RATE) % 1.0, 1.0, atol=1e-6)
     assert at_samples.sum() > 100
-    np.testing.assert_allclose(r.qd[at_samples, 0], (-0.7 + 0.9 * r.t)[at_samples], atol=1e-9)
-    np.testing.assert_allclose(r.qdd[at_samples, 0], 0.9, atol=1e-7)
+    np.testing.assert_allclose(r.qd[at_samples, 0], (-0.7 + 0.9 * r.t)[at_samples], atol=1e-7)
+    np.testing.assert_allclose(r.qdd[at_samples, 0], 0.9, atol=5e-5)
 
 
 def test_ends_that_the_smoother_cannot_fill_are_left_out_unless_padded():
@@ -118,10 +119,21 @@ def test_quantised_positions_give_speeds_far_better_than_their_steps():
 def test_resting_speed_is_three_deviations_of_what_encoder_noise_makes():
     t, rng = times(20.0), np.random.default_rng(2)
     q = 0.2 * wave(t, 0.3)[0]
-    r = condition(logged(t, q + 2e-4 * rng.normal(size=len(t))), BAND)
+    r = condition(logged(t, q + 2e-3 * rng.normal(size=len(t))), BAND)
     error = np.std(r.qd[:, 0] - 0.2 * wave(r.t, 0.3)[1])
-    # The median of third differences knows the noise to a few per cent.
-    assert r.rest_speed[0] == pytest.approx(3.0 * error, rel=0.15)
+    # Where noise ends and signal begins is known to a window's resolution: a few tenths of the speed's small noise.
+    assert r.rest_speed[0] == pytest.approx(3.0 * error, rel=0.4)
+
+
+def test_encoder_noise_above_the_motion_does_not_fill_the_acceleration():
+    t, rng = times(20.0), np.random.default_rng(3)
+    q = wave(t, 0.3)[0]
+    noise = 2e-5 * rng.normal(size=len(t))
+    r = condition(logged(t, q + noise), BAND)
+    error = np.std(r.qdd[:, 0] - wave(r.t, 0.3)[2])
+    # White noise of density 2 sigma^2/rate through w^2 up to the band's end.
+    in_band = 2e-5 * np.sqrt(2.0 / RATE * (2.0 * np.pi) ** 4 * BAND.position**5 / 5.0)
+    assert error < 0.1 * in_band  # the motion ends at 0.3 Hz, the band far above
 
 
 def test_a_joint_at_rest_does_not_count_and_a_moving_one_does():

@@ -33,6 +33,9 @@ class GravitySpring(AbstractEffect):
     def amplitudes(self, values):
         return values["stiffness"] * np.array([1.0, -values["rest"]]), np.zeros(0)
 
+    def lowest(self, robot, joints):
+        return np.array([-float(robot.stiffness[joints[0]]), -np.inf])  # no spring pushes away from its rest
+
     def where(self, names, values, units):
         return (
             f"{names}: {values['stiffness']:.3g} {units['stiffness']} away from {values['rest']:.3g} {units['rest']}, "

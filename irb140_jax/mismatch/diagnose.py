@@ -98,6 +98,11 @@ def _diagnosed(
     proof = held_out(ex, refit_grams, refit_columns)
     progress("looking for structure that no effect explains")
     rest = unexplained(ex, proof)
+    doubtful = {c for u in rest for c in u.doubtful}
+    if doubtful:  # names that only stand in for what has none
+        ex = dataclasses.replace(ex, chosen=tuple(c for c in ex.chosen if c not in doubtful))
+        proof = held_out(ex, refit_grams, refit_columns)
+        rest = unexplained(ex, proof)
     found = findings(robot, ex)
     model = _model(robot, ex, refit_grams, refit_columns, band)
     diagnosis = _document(robot, ex, proof, found, rest, recordings)

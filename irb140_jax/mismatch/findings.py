@@ -134,7 +134,8 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
     for key, value in _pairs(ex, rest, c).items():
         odds[key] = max(odds.get(key, -np.inf), min(value, own))
     odds["", ()] = 0.0
-    return odds
+    # What the search preferred by its own rules is at least as probable as what it did not take.
+    return {key: value if key == (c.slug, c.joints) else min(value, own) for key, value in odds.items()}
 
 
 def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[tuple[str, tuple[int, ...]], float]:

@@ -1,20 +1,38 @@
-"""Structure that no effect of the library explains: a flexible competitor, scored on data that it did not see."""
+"""Structure that no effect of the library explains: flexible competitors, scored on data that they did not see.
+
+Each competitor knows one group of variables: the joint's position and speed, its load, its past, another joint, time.
+If one of them predicts what the findings leave, something is left out, and its variables say where.
+"""
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
+from scipy import signal
 
-from irb140_jax.mismatch.explain import Explanation
+from irb140_jax.mismatch.candidates import Stretch
+from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.noise import Noise
-from irb140_jax.mismatch.prove import HeldOut, folds
+from irb140_jax.mismatch.prove import HeldOut
 
-FEATURES = 120  # random Fourier features a variable set; more adds nothing at this length of data
+FEATURES = 60  # random Fourier features a competitor
 SHIFTS = 99  # circular time shifts that make the null
 MATERIAL_SHARE = 0.05  # of the remaining residual's variance; less is not worth a person's time
-MATERIAL_TORQUE = 0.02  # of the joint's torque RMS; below, noise-free input would report rounding
+MATERIAL_TORQUE = 0.02  # of the joint's torque RMS; below, what smoothing and imperfect laws leave
 SIGNIFICANT = 0.01
 SEED = 20260
-VARIABLES = ("position", "speed", "acceleration", "load", "time")
+SLOWEST, FASTEST = 0.3, 8.0  # Hz: oscillators that the competitor with a memory may hold
+OSCILLATORS = 12
+RINGING = 0.1  # their damping ratio
+MOTION_BLOCK = 2.5  # s left out together
+RIDGES = (0.001, 0.03, 1.0)  # of the features' variance; the best one counts, in the null as well
+TIME_BAND = 1.0  # Hz up to which the competitor of time follows
+TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
+BELITTLED = 0.5  # a finding smaller than this many times its joint's nameless structure may be a part of that
+NO_WORSE = 1.1  # ratio of unseen errors below which the structure's competitor can do without such a finding
+BETTER = 0.95  # and without any finding: where it distorts what is simple without it
+ALMOST_ALL = 0.8
+NEARLY = 2.0 / 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,8 +43,9 @@ class Unexplained:
         joint: Index.
         share: Part of the remaining residual's variance that is predictable on unseen data.
         p_value: Share of time-shifted copies that are as predictable.
-        variable: The variable that carries most of it.
+        variable: The variables that carry it, in words.
         rms: Size of the predictable part [N m or N].
+        doubtful: Findings (candidate indices) that this structure's own variables make superfluous.
     """
 
     joint: int
@@ -34,88 +53,223 @@ class Unexplained:
     p_value: float
     variable: str
     rms: float
+    doubtful: tuple[int, ...]
+
+
+class Competitor(NamedTuple):
+    """Features of some variables at a joint's rows.
+
+    Attributes:
+        variable: The variables in words.
+        features: Shape (R, F), of the order of one.
+        fold: Which rows are left out together, shape (R,).
+        shifts: Whether shifting time breaks what it could rightly predict, so that shifted copies make its null.
+    """
+
+    variable: str
+    features: np.ndarray
+    fold: np.ndarray
+    shifts: bool
+
+
+class Rows(NamedTuple):
+    """The rows of one joint over all recordings that count.
+
+    Attributes:
+        pick: Which rows of each stretch those are.
+        residual: Held-out residual over the level of its recording's noise, shape (R,).
+        level: That level, row by row [N m or N], shape (R,).
+        recording: Shape (R,).
+    """
+
+    pick: list[np.ndarray]
+    residual: np.ndarray
+    level: np.ndarray
+    recording: np.ndarray
+
+    def of(self, arrays: list[np.ndarray]) -> np.ndarray:
+        """The rows of arrays given stretch by stretch."""
+        return np.concatenate([a[p] for a, p in zip(arrays, self.pick, strict=True)])
 
 
 def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
-    """Joints whose residual, findings taken off, can be predicted on unseen data from the motion."""
+    """Joints whose residual, findings taken off, can be predicted on unseen data."""
     out = []
-    n = len(proof.floor)
     torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
     rmse = proof.rmse(proof.corrected)
-    for j in range(n):
-        inputs, y, fold = _whitened_residual(ex, proof, j)
-        if len(y) < 200:
+    for j in range(len(torque)):
+        rows = _rows(ex, proof, j)
+        # No share of so small a residual could matter.
+        if len(rows.residual) < 200 or rmse[j] < MATERIAL_TORQUE * torque[j]:
             continue
-        share = _predictable(inputs, y, fold)
+        rivals = competitors(ex.data.stretches, j, rows, ex.lib.robot.joint_names)
+        shares = np.array([_scores(c, rows.residual[:, None])[0] for c in rivals])
+        best = _carrier(rivals, shares)
+        share = float(shares[best])
         size = np.sqrt(max(share, 0.0)) * rmse[j]
         if share < MATERIAL_SHARE or size < MATERIAL_TORQUE * torque[j]:
             continue
-        null = _null(inputs, y, fold)
-        p = (1 + np.sum(null >= share)) / (1 + len(null))
-        if p > SIGNIFICANT:
-            continue
-        alone = {v: _predictable(inputs[:, [k]], y, fold) for k, v in enumerate(VARIABLES)}
-        out.append(Unexplained(j, float(share), float(p), max(alone, key=lambda v: alone[v]), float(size)))
+        p = _p_value(rivals, rows, share)
+        if p <= SIGNIFICANT:
+            doubtful = _doubtful(ex, j, rows, rivals[best], size)
+            out.append(Unexplained(j, share, p, rivals[best].variable, float(size), doubtful))
     return out
 
 
-def _whitened_residual(ex: Explanation, proof: HeldOut, j: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Inputs (R, 5) standardised, the held-out residual, and the fold of each row.
+def _carrier(rivals: list[Competitor], shares: np.ndarray) -> int:
+    """The best competitor; time only where motion does not do nearly as well, for whatever is slow goes with time."""
+    motion = np.where([c.shifts for c in rivals], shares, -np.inf)
+    return int(np.argmax(motion if motion.max() > NEARLY * shares.max() else shares))
 
-    Only the level is divided out, not the colour: a slow structure is exactly what is looked for.
-    """
-    inputs, target, fold = [], [], []
-    split = folds(ex.grams)
-    for r, s in enumerate(ex.data.stretches):
-        blocks = np.flatnonzero(ex.grams.recording == s.recording)
-        edges = np.linspace(0, len(s.t), len(blocks) + 1).astype(int)
-        of_row = np.zeros(len(s.t), dtype=int)
-        for b, block in enumerate(blocks):
-            of_row[edges[b] : edges[b + 1]] = next(i for i, f in enumerate(split) if f[block])
-        use = Noise.usable(s.use[:, j])
-        t = (s.t - s.t[0]) / max(s.t[-1] - s.t[0], 1e-9)
-        x = np.stack([s.q[:, j], s.qd[:, j], s.qdd[:, j], s.nominal[:, j], t], axis=1)
-        inputs.append(x[use])
-        target.append(proof.corrected[r][use, j] / ex.noise.total[r, j])
-        fold.append(of_row[use])
-    x, y, f = np.concatenate(inputs), np.concatenate(target), np.concatenate(fold)
+
+def competitors(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
+    """All competitors for what is left at joint `j`, weighted like the residual."""
+    weight = (np.median(rows.level) / rows.level)[:, None]
+    return [c._replace(features=weight * c.features) for c in _unweighted(stretches, j, rows, names)]
+
+
+def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
+    q, qd, qdd, load = (
+        np.stack([_standard(rows.of([getattr(s, name)[:, i] for s in stretches])) for i in range(len(names))], axis=1)
+        for name in ("q", "qd", "qdd", "nominal")
+    )
+    mine = lambda x: x[:, [j]]  # noqa: E731
+    groups = {
+        "position": mine(q),
+        "speed": mine(qd),
+        "position and speed": np.hstack([mine(q), mine(qd)]),
+        "load and speed": np.hstack([mine(load), mine(qd)]),
+        "acceleration": mine(qdd),
+    }
+    fold = _motion_folds(stretches, rows)
+    out = [Competitor(f"the joint's {name}", _features(x), fold, True) for name, x in groups.items()]
+    out.append(Competitor("the joint's own past", _memory(stretches, j, rows), fold, True))
+    for i, name in enumerate(names):
+        if i != j:
+            pairs = [np.hstack([mine(x), x[:, [i]]]) for x in (q, qd)]
+            drive = np.hstack([qdd[:, [i]], load[:, [i]], mine(qd) * qd[:, [i]]])
+            features = np.hstack([*(_features(x) for x in pairs), drive])
+            out.append(Competitor(f"{name} beside the joint's own motion", features, fold, True))
+    return [*out, _time(stretches, rows)]
+
+
+def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
+    """Only the level is divided out, not the colour: a slow structure is exactly what is looked for."""
+    pick = [Noise.usable(s.use[:, j]) for s in ex.data.stretches]
+    level = np.concatenate([np.full(p.sum(), ex.noise.total[r, j]) for r, p in enumerate(pick)])
+    recording = np.repeat(np.arange(len(pick)), [p.sum() for p in pick])
+    y = np.concatenate([c[p, j] for c, p in zip(proof.corrected, pick, strict=True)]) / level
     if len(y):
-        x = (x - x.mean(axis=0)) / np.maximum(x.std(axis=0), 1e-12)
         limit = 6.0 * np.median(np.abs(y)) + 1e-12
         y = np.clip(y - np.mean(y), -limit, limit)
-    return x, y, f
+    return Rows(pick, y, level, recording)
+
+
+def _motion_folds(stretches: list[Stretch], rows: Rows) -> np.ndarray:
+    """Contiguous stretches of `MOTION_BLOCK`, five folds: far longer than any noise remembers."""
+    t = rows.of([s.t - s.t[0] for s in stretches])
+    return ((t / MOTION_BLOCK).astype(int) + rows.recording) % 5
+
+
+def _standard(x: np.ndarray) -> np.ndarray:
+    return (x - x.mean(axis=0)) / np.maximum(x.std(axis=0), 1e-12)
 
 
 def _features(x: np.ndarray) -> np.ndarray:
+    """Random Fourier features at three scales, the variables and their signs, shape (R, F)."""
     rng = np.random.default_rng(SEED)
-    omega = rng.normal(size=(x.shape[1], FEATURES)) * rng.choice([0.5, 1.0, 2.0], size=FEATURES)
+    omega = rng.normal(size=(x.shape[1], FEATURES)) * rng.choice([0.7, 1.5, 4.0], size=FEATURES)
     phase = rng.uniform(0, 2 * np.pi, FEATURES)
     return np.concatenate([np.cos(x @ omega + phase), x, np.sign(x)], axis=1)
 
 
-def _predictable(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> float:
-    """Share of variance that ridge regression on the features predicts on left-out folds."""
-    return float(_scores(_features(x), y[:, None], fold)[0])
+def _memory(stretches: list[Stretch], j: int, rows: Rows) -> np.ndarray:
+    """Oscillators of many frequencies shaken by the joint's acceleration: positions and speeds, shape (R, F)."""
+    parts = []
+    for s in stretches:
+        dt = float(np.median(np.diff(s.t)))
+        part = []
+        for f in np.geomspace(SLOWEST, min(FASTEST, 0.3 / dt), OSCILLATORS):
+            omega = 2.0 * np.pi * f
+            system = signal.cont2discrete(
+                (np.array([[0, 1], [-(omega**2), -2 * RINGING * omega]]), np.array([[0], [1]]),
+                 np.diag([omega**2, omega]), np.zeros((2, 1))), dt, method="bilinear",
+            )  # fmt: skip
+            part.append(signal.dlsim(system, s.qdd[:, j])[1])
+        parts.append(np.hstack(part))
+    return np.hstack([_standard(rows.of(parts)), _standard(rows.of([s.qdd[:, [j]] for s in stretches]))])
 
 
-def _scores(phi: np.ndarray, Y: np.ndarray, fold: np.ndarray) -> np.ndarray:
-    missed, whole = np.zeros(Y.shape[1]), np.sum(Y**2, axis=0)
-    for f in np.unique(fold):
-        train, test = fold != f, fold == f
-        if not train.any():
-            return np.zeros(Y.shape[1])
-        A = phi[train]
-        w = np.linalg.solve(A.T @ A + 1e-2 * len(A) * np.eye(A.shape[1]), A.T @ Y[train])
-        missed += np.sum((Y[test] - phi[test] @ w) ** 2, axis=0)
-    return 1.0 - missed / np.maximum(whole, 1e-300)
+def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
+    """Cosines of each recording's own time, up to `TIME_BAND`; short blocks are left out in turn."""
+    features, folds = [], []
+    for r, (s, pick) in enumerate(zip(stretches, rows.pick, strict=True)):
+        length = s.t[-1] - s.t[0]
+        count = max(int(2.0 * TIME_BAND * length), 2)
+        own = np.cos(np.pi * np.outer((s.t[pick] - s.t[0]) / length, np.arange(count)))
+        features.append((r, own))
+        folds.append(((s.t[pick] - s.t[0]) / TIME_BLOCK).astype(int) % 5)
+    width = sum(own.shape[1] for _, own in features)
+    phi, row, column = np.zeros((len(rows.residual), width)), 0, 0
+    for _, own in features:
+        phi[row : row + len(own), column : column + own.shape[1]] = own
+        row, column = row + len(own), column + own.shape[1]
+    return Competitor("time", phi, np.concatenate(folds), False)
 
 
-def _null(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> np.ndarray:
-    """Scores of copies of the residual shifted in time against the motion, within each fold."""
+def _scores(c: Competitor, Y: np.ndarray) -> np.ndarray:
+    """Share of each column's variance that ridge regression on the features predicts on left-out folds."""
+    return 1.0 - _missed(c, Y) / np.maximum(np.sum(Y**2, axis=0), 1e-300)
+
+
+def _missed(c: Competitor, Y: np.ndarray) -> np.ndarray:
+    """Squared error of each column on left-out folds, with the best ridge."""
+    missed = np.zeros((len(RIDGES), Y.shape[1]))
+    whole, cross = c.features.T @ c.features, c.features.T @ Y
+    for f in np.unique(c.fold):
+        test = c.fold == f
+        A = c.features[test]
+        values, vectors = np.linalg.eigh(whole - A.T @ A)
+        seen, projected = A @ vectors, vectors.T @ (cross - A.T @ Y[test])
+        for k, ridge in enumerate(RIDGES):
+            w = projected / (np.maximum(values, 0.0) + ridge * max((~test).sum(), 1))[:, None]
+            missed[k] += np.sum((Y[test] - seen @ w) ** 2, axis=0)
+    return missed.min(axis=0)
+
+
+def _p_value(rivals: list[Competitor], rows: Rows, share: float) -> float:
+    """Share of copies of the residual, shifted in time against the motion, that some competitor predicts as well."""
     rng = np.random.default_rng(SEED + 1)
-    copies = np.empty((len(y), SHIFTS))
-    for f in np.unique(fold):
-        rows = np.flatnonzero(fold == f)
+    copies = np.empty((len(rows.residual), SHIFTS))
+    for r in np.unique(rows.recording):
+        at = np.flatnonzero(rows.recording == r)
         for k in range(SHIFTS):
-            copies[rows, k] = np.roll(y[rows], rng.integers(len(rows) // 10, max(len(rows) - len(rows) // 10, 2)))
-    return _scores(_features(x), copies, fold)
+            copies[at, k] = np.roll(rows.residual[at], rng.integers(len(at) // 10, max(len(at) - len(at) // 10, 2)))
+    null = np.max([_scores(c, copies) for c in rivals if c.shifts], axis=0)
+    return float((1 + np.sum(null >= share)) / (1 + SHIFTS))
+
+
+def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: float) -> tuple[int, ...]:
+    """Findings that only stand in for the structure: its own variables predict as well without them.
+
+    Smallest first, each on top of those before.
+    """
+    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    w, at, torques = post.mean * ex.data.scale[post.columns], ex.data.nuisances, {}
+    for index in ex.chosen:
+        c = ex.data.candidates[index]
+        part = slice(at, at + len(c.columns))
+        at += len(c.columns)
+        torque = [s.X[..., post.columns[part]] @ w[part] for s in ex.data.stretches]
+        energy = sum(np.sum((x / ex.noise.total[r]) ** 2, axis=0) for r, x in enumerate(torque))
+        if c.slug != "inertials" and energy[j] > ALMOST_ALL * energy.sum():
+            torques[index] = rows.of([x[:, j] for x in torque])
+    out, y = [], rows.residual
+    for index in sorted(torques, key=lambda i: float(np.sum(torques[i] ** 2))):
+        without = y + torques[index] / rows.level
+        small = np.sqrt(np.mean(torques[index] ** 2)) * BELITTLED < size
+        error = _missed(carrier, without[:, None])[0] / _missed(carrier, y[:, None])[0]
+        if error < BETTER or (small and error < NO_WORSE):
+            out.append(index)
+            y = without
+    return tuple(out)

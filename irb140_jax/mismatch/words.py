@@ -82,7 +82,7 @@ def unexplained_entry(robot: Robot, u: Unexplained) -> dict[str, Any]:
     unit = "N" if robot.is_slide[u.joint] else "N m"
     return {
         "joints": [name],
-        "where": f"{name}: {u.rms:.3g} {unit} RMS that follow the joint's {u.variable} and that no effect explains",
+        "where": f"{name}: {u.rms:.3g} {unit} RMS that follow {u.variable} and that no effect explains",
         "share": u.share,
         "p_value": u.p_value,
     }

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from scipy import interpolate, signal
 
 from irb140_jax.recordings.concealed.catalogue import FIRST_NINE
 from irb140_jax.recordings.concealed.choice import Concealment as Concealment
@@ -33,11 +34,24 @@ class Noise:
         encoder: Standard deviation of joint positions [rad or m].
         resolution: Step of the encoders [rad or m]; 0: none.
         torque: Standard deviation of the torque, as a share of each joint's torque RMS.
+        colour: Correlation of the torque's noise over a hundredth of a second.
+        spikes: Share of the torque samples with a spike of up to 30 standard deviations.
+        jitter: Standard deviation of the time between samples, as a share of it; the stamps tell the true times.
+        lost: Share of the samples lost, in runs of one to eight.
     """
 
     encoder: float = 2e-5
     resolution: float = 0.0
     torque: float = 0.01
+    colour: float = 0.0
+    spikes: float = 0.0
+    jitter: float = 0.0
+    lost: float = 0.0
+
+
+ROUGH = Noise(
+    encoder=0.0, resolution=2.0 * np.pi / 2**17, torque=0.02, colour=0.8, spikes=0.001, jitter=0.1, lost=0.01
+)  # a log as cheap controllers write it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -217,13 +231,41 @@ def _recording(
     rng: np.random.Generator,
 ) -> Recording:
     """What the sensors make of a log."""
-    pick = slice(None, None, step)
-    q = log.q[pick] + noise.encoder * rng.normal(size=log.q[pick].shape)
+    t = log.t[::step]
+    q, qd, qdd, tau = (x[::step] for x in (log.q, log.qd, log.qdd, log.tau))
+    if noise.jitter > 0.0:
+        t = t + noise.jitter * (t[1] - t[0]) * np.clip(rng.normal(size=len(t)), -3.0, 3.0)
+        t = np.clip(t, log.t[0], log.t[-1])
+        q, qd, qdd, tau = (interpolate.make_interp_spline(log.t, x, k=3)(t) for x in (log.q, log.qd, log.qdd, log.tau))
+    q = q + noise.encoder * rng.normal(size=q.shape)
     if noise.resolution > 0.0:
         q = noise.resolution * np.round(q / noise.resolution)
     rms = np.array([survey.rms(j) for j in range(len(names))])
-    tau = log.tau[pick] + noise.torque * rms * rng.normal(size=log.tau[pick].shape)
+    tau = tau + noise.torque * rms * _torque_noise(noise, tau.shape, float(np.diff(t).mean()), rng)
+    keep = _kept(noise.lost, len(t), rng)
     return Recording(
-        t=log.t[pick], q=q, tau=tau, qd=log.qd[pick] if with_speeds else None,
-        qdd=log.qdd[pick] if with_speeds else None, extras={}, joint_names=tuple(names), source=name, notes=(),
+        t=t[keep], q=q[keep], tau=tau[keep], qd=qd[keep] if with_speeds else None,
+        qdd=qdd[keep] if with_speeds else None, extras={}, joint_names=tuple(names), source=name, notes=(),
     )
+
+
+def _torque_noise(noise: Noise, shape: tuple[int, int], dt: float, rng: np.random.Generator) -> np.ndarray:
+    """Noise of unit variance with its colour, and spikes, shape (samples, n)."""
+    white = rng.normal(size=shape)
+    if noise.colour > 0.0:
+        a = noise.colour ** (dt / 0.01)
+        white = signal.lfilter([np.sqrt(1.0 - a**2)], [1.0, -a], white, axis=0)
+    if noise.spikes > 0.0:
+        hit = rng.random(shape) < noise.spikes
+        white = white + hit * rng.uniform(10.0, 30.0, size=shape) * rng.choice([-1.0, 1.0], size=shape)
+    return white
+
+
+def _kept(lost: float, samples: int, rng: np.random.Generator) -> np.ndarray:
+    """Which samples the logger did not lose, shape (samples,); the first and the last are kept."""
+    keep = np.ones(samples, dtype=bool)
+    if lost > 0.0:
+        for start in np.flatnonzero(rng.random(samples) < lost / 4.5):
+            keep[start : start + rng.integers(1, 9)] = False
+        keep[[0, -1]] = True
+    return keep

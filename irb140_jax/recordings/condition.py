@@ -21,6 +21,7 @@ MIN_TORQUE_BAND = 4.0  # Hz; friction reversals are steps, a narrower band would
 WORKING_RATE = 200.0  # Hz; columns are evaluated at least this often
 SLOW = 3.0  # Hz; below, model and log may differ by the very friction that is looked for
 INCOHERENT = 0.05  # share of the model's torque that may be noise: what biases parameters by as much
+CERTAIN = 1.5  # times the noise that a spectrum must exceed before any of it counts as signal: its own scatter
 KAISER_BETA = 6.0  # about 63 dB in the stop band: below the noise of any torque log
 
 
@@ -104,7 +105,8 @@ def choose_band(recordings: list[Recording], robot: Robot) -> Band:
         t, q, _, _ = _even(recording)
         rate = (len(t) - 1) / (t[-1] - t[0])
         rates.append(rate)
-        top.append([_signal_limit(q[:, j], rate) for j in range(q.shape[1])])
+        noise = [white_noise(recording.t, x) for x in recording.q.T]
+        top.append([_signal_limit(x, 2.0 * s**2 / rate, rate) for x, s in zip(q.T, noise, strict=True)])
     # The fastest recording decides; within it, the middling joint: a still joint says nothing, a noisy one too much.
     limit = max((float(np.median([f for f in row if f > 0] or [0.0])) for row in top), default=0.0)
     slowest = float(min(rates))
@@ -183,12 +185,14 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     h, h1, h2 = _kernels(band.position, raw_rate)
     half = (len(h) - 1) // 2
     anti_alias = _kernels(min(0.4 * band.rate, 0.45 * raw_rate), raw_rate)[0]
+    density = np.array([2.0 * white_noise(recording.t, x) ** 2 / raw_rate for x in recording.q.T])
+    q, speed_noise = _without_noise(q, density, raw_rate, h1)
     smoothed = [_filtered(q, k, odd=True) for k in (h, h1, h2)]
     tau = _filtered(tau, anti_alias, odd=False)
     keep = slice(None) if pad else slice(half, len(t) - half)
     grid = np.arange(t[keep][0], t[keep][-1] + 1e-9, 1.0 / band.rate)
     q, qd, qdd, tau = (_at(grid, t, x) for x in (*smoothed, tau))
-    rest_speed = resting_speed(recording, qd, h1)
+    rest_speed = np.maximum(np.maximum(3.0 * speed_noise, 0.003 * np.abs(qd).max(axis=0, initial=0.0)), 1e-6)
     resting = ndimage.minimum_filter1d((np.abs(qd) < rest_speed).astype(int), int(0.1 * band.rate) | 1, axis=0)
     resting = ndimage.maximum_filter1d(resting, int(0.2 * band.rate) | 1, axis=0).astype(bool)
     # A gap spoils what the smoother and, later, the low-pass reach from it; half their length holds most of that.
@@ -200,11 +204,70 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     return Conditioned(recording.source, grid, q, qd, qdd, tau, ~resting & ~lost[:, None], rest_speed, tuple(notes))
 
 
-def resting_speed(recording: Recording, qd: np.ndarray, taps: np.ndarray) -> np.ndarray:
-    """Speed below which direction is a guess: encoder noise through the differentiator, or 0.3 % of top speed."""
-    noise = np.array([_white_noise(recording.q[:, j]) for j in range(recording.q.shape[1])])
-    speed = np.abs(qd).max(axis=0) if len(qd) else np.zeros(recording.q.shape[1])
-    return np.maximum(np.maximum(3.0 * noise * np.linalg.norm(taps), 0.003 * speed), 1e-6)
+def _without_noise(q: np.ndarray, density: np.ndarray, rate: float, h1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Wiener's smoother: every frequency of every joint's position weighted by the share of it that is signal.
+
+    What is optimal for q is so for its derivatives too.  Without it, encoder noise between the motion's highest
+    frequency and the band's would fill qdd.
+
+    Args:
+        q: Positions on an even grid, shape (T, n).
+        density: Power density of their white noise [rad^2/Hz or m^2/Hz], shape (n,).
+        rate: Samples per second.
+        h1: Taps of the differentiator that follows.
+
+    Returns:
+        Positions, shape (T, n), and the standard deviation of the noise in their speeds, shape (n,).
+
+    Source: N. Wiener, Extrapolation, Interpolation and Smoothing of Stationary Time Series, 1949.
+    """
+    reach = min(len(q) - 1, int(2.0 * rate))
+    longer = np.pad(q, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
+    trend = np.linspace(0.0, 1.0, len(longer))[:, None] * (longer[-1] - longer[0]) + longer[0]
+    spectrum = np.fft.rfft(longer - trend, axis=0)
+    f = np.fft.rfftfreq(len(longer), 1.0 / rate)
+    out, noise = np.empty_like(q), np.zeros(q.shape[1])
+    for j in range(q.shape[1]):
+        share, floor, at = _signal_share(q[:, j], density[j], rate)
+        weight = np.interp(f, at, share)
+        out[:, j] = (np.fft.irfft(spectrum[:, j] * weight, len(longer)) + trend[:, j])[reach : reach + len(q)]
+        response = np.abs(np.fft.rfft(h1, 8192)) * np.interp(np.fft.rfftfreq(8192, 1.0 / rate), at, share)
+        noise[j] = np.sqrt(floor * np.sum(response**2) * rate / 8192)
+    return out, noise
+
+
+def _signal_share(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, float, np.ndarray]:
+    """Share of the signal in a position's power at each frequency, density of its white noise, frequencies [Hz]."""
+    f, p, floor = _spectrum(x, density, rate)
+    smooth = ndimage.uniform_filter1d(p, 5, mode="nearest")
+    share = np.clip(1.0 - CERTAIN * floor / np.maximum(smooth, 1e-300), 0.0, 1.0)
+    share[f < 1.0] = 1.0  # below, windows of four seconds can't tell
+    return share, floor, f
+
+
+def _spectrum(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Frequencies [Hz], power density of a position, and that of its white noise: as known, or as seen at the top."""
+    window = windows.kaiser(min(len(x), int(4 * rate)), 14.0)
+    f, p = signal.welch(x, rate, window=window, detrend="linear")
+    return f, p, max(float(np.median(p[f > 0.6 * f[-1]])), density)
+
+
+def white_noise(t: np.ndarray, x: np.ndarray) -> float:
+    """Standard deviation of the white part of a smooth signal, unevenly sampled or not.
+
+    Every sample is compared with the cubic through its four neighbours; the median is robust to the signal.  Resampling
+    smooths the noise, so it has to be known from the samples themselves.
+    """
+    if len(x) < 10:
+        return 0.0
+    near = [t[i : len(t) - 4 + i] - t[2:-2] for i in (0, 1, 3, 4)]
+    weights = np.stack([
+        np.prod([near[m] / (near[m] - near[k]) for m in range(4) if m != k], axis=0) for k in range(4)
+    ])  # fmt: skip
+    values = np.stack([x[i : len(x) - 4 + i] for i in (0, 1, 3, 4)])
+    off = (x[2:-2] - np.sum(weights * values, axis=0)) / np.sqrt(1.0 + np.sum(weights**2, axis=0))
+    moving = off[np.ptp(values, axis=0) > 0]  # at rest, a coarse encoder shows no noise
+    return float(np.median(np.abs(moving)) / 0.6745) if len(moving) > 10 else 0.0
 
 
 def _even(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -255,22 +318,11 @@ def _filtered(x: np.ndarray, taps: np.ndarray, *, odd: bool) -> np.ndarray:
     return signal.oaconvolve(extended, taps[:, None], mode="valid", axes=0)
 
 
-def _white_noise(x: np.ndarray) -> float:
-    """Standard deviation of the white part of a smooth signal, from its third differences (robust to the signal)."""
-    d = np.diff(x, 3)
-    moving = d[np.abs(np.diff(x)[1:-1]) > 0] if np.any(np.diff(x)) else d
-    if len(moving) < 10:
-        return 0.0
-    return float(np.median(np.abs(moving)) / 0.6745 / np.sqrt(20.0))
-
-
-def _signal_limit(x: np.ndarray, rate: float) -> float:
+def _signal_limit(x: np.ndarray, density: float, rate: float) -> float:
     """Frequency [Hz] up to which a position's spectrum stands above its noise; 0 for a joint at rest."""
     if np.ptp(x) == 0:
         return 0.0
-    window = windows.kaiser(min(len(x), int(4 * rate)), 14.0)
-    f, p = signal.welch(x, rate, window=window, detrend="linear")
-    floor = np.median(p[f > 0.6 * f[-1]])
+    f, p, floor = _spectrum(x, density, rate)
     above = np.flatnonzero(p > 10.0 * floor)
     return float(f[above[-1]]) if len(above) else 0.0
 

@@ -3,6 +3,8 @@
 from irb140_jax.errors import InputError
 from irb140_jax.recordings.concealed import drive, friction, surroundings, transmission
 from irb140_jax.recordings.concealed.hidden import Hidden
+from irb140_jax.recordings.concealed.other_laws import OTHER_LAWS
+from irb140_jax.recordings.concealed.outside import OUTSIDE
 
 HIDDEN: dict[str, type[Hidden]] = {
     kind.slug: kind
@@ -18,12 +20,17 @@ HIDDEN: dict[str, type[Hidden]] = {
 FIRST_NINE = tuple(HIDDEN)[:9]
 
 
-def hidden_kind(slug: str) -> type[Hidden]:
-    """The class that hides an effect.
+def hidden_kind(slug: str, other_law: bool = False) -> type[Hidden]:
+    """The class that hides an effect of the vocabulary, or physics outside it.
+
+    Args:
+        slug: Its name.
+        other_law: Whether to hide it under another formula than the library's, where there is one.
 
     Raises:
         InputError: No such effect; the message lists those there are.
     """
-    if slug not in HIDDEN:
-        raise InputError(f"effect {slug!r} can't be concealed; choose one of {', '.join(sorted(HIDDEN))}")
-    return HIDDEN[slug]
+    kinds = {**HIDDEN, **OUTSIDE, **(OTHER_LAWS if other_law else {})}
+    if slug not in kinds:
+        raise InputError(f"effect {slug!r} can't be concealed; choose one of {', '.join(sorted(kinds))}")
+    return kinds[slug]

@@ -20,12 +20,14 @@ class Concealment:
         joints: The joints it acts on, by name; all of them for effects that act everywhere, then best left empty.
         share: RMS of its torque as a share of the joint's torque RMS.
         parameters: Parameters given instead of drawn; when all are given, `share` is not used.
+        other_law: Hide it under another formula than the library's, where there is one.
     """
 
     effect: str
     joints: tuple[str, ...] = ()
     share: float = 0.1
     parameters: dict[str, float] = dataclasses.field(default_factory=dict)
+    other_law: bool = False
 
 
 def chosen(concealment: Concealment, survey: Survey, names: Sequence[str], seed: int, k: int) -> Hidden:
@@ -41,7 +43,7 @@ def chosen(concealment: Concealment, survey: Survey, names: Sequence[str], seed:
     Raises:
         InputError: Unknown effect, joint or parameter, or the wrong number of joints.
     """
-    kind = hidden_kind(concealment.effect)
+    kind = hidden_kind(concealment.effect, concealment.other_law)
     rng = np.random.default_rng([seed, 10, k])
     for name in concealment.joints:
         if name not in names:
@@ -55,7 +57,8 @@ def chosen(concealment: Concealment, survey: Survey, names: Sequence[str], seed:
     elif len(joints) != kind.joints_acted_on:
         raise InputError(f"{concealment.effect} acts on {kind.joints_acted_on} joint(s); got {len(joints)}")
     drawn = kind.drawn(joints, concealment.share, survey, rng)
-    return kind(joints, {**drawn.parameters, **concealment.parameters})
+    drawn.parameters.update(concealment.parameters)
+    return drawn
 
 
 def meaningful_sites(effect: str, survey: Survey) -> list[tuple[int, ...]]:
