@@ -98,6 +98,10 @@ def _percent(values: Iterable[float]) -> str:
     return f"{100 * float(np.mean(values)):.0f} %" if values else "-"
 
 
+def _mean(values: list[int]) -> float:
+    return float(np.mean(values)) if values else 0.0
+
+
 def _median(values: Iterable[float]) -> str:
     values = [v for v in values if np.isfinite(v)]
     return f"{np.median(values):.3g}" if values else "-"
@@ -125,7 +129,7 @@ MEASURES: dict[str, dict[str, Callable[[list[dict]], str]]] = {
             {j for _, js in truths(c) for j in js} == {j for _, js in founds(c) for j in js} for c in cs),
         "name exact, nothing added": lambda cs: _percent(truths(c) == founds(c) for c in cs),
         "name within the stated set": lambda cs: _percent(_in_set(c) for c in cs),
-        "mean size of a stated set": lambda cs: _median([np.mean([len(s) for c in cs for s in _stated(c)] or [0])]),
+        "mean size of a stated set": lambda cs: f"{_mean([len(s) for c in cs for s in _stated(c)]):.2f}",
         "held-out error removed, over what an oracle removes, median": lambda cs: _median(_removed(c) for c in cs),
     },
     "rough": {
@@ -174,7 +178,8 @@ def line_of(case: dict) -> str:
     mark = "ok  " if hidden == found else "MISS"
     return (
         f"{mark} {case['seed']} {case['row']} n={n} missed [{said(hidden - found, n)}] "
-        f"added [{said(found - hidden, n)}] {case['verdict']} unexplained {sum((u['joints'] for u in case['unexplained']), [])} "
+        f"added [{said(found - hidden, n)}] {case['verdict']} "
+        f"unexplained {[j for u in case['unexplained'] for j in u['joints']]} "
         f"noise x{_over_noise(case):.2f} {case['seconds']:.0f} s"
     )
 
@@ -227,10 +232,11 @@ def write(out: pathlib.Path) -> None:
     lines = [
         "# Trials: concealed physics of every kind",
         "",
-        "Written by `experiments/trials.py` from `results/trials_*.jsonl`. MuJoCo drives the arm in closed loop, inertials 5 %",
-        "wrong; three recordings of 15 s; the IRB 140 and random robots of 1 to 7 joints with slides. Strength is the effect's",
-        "torque RMS as a share of its joint's: plain 20 %, masked 6 %, buried 2 %. A rough log has encoders of 17 bits, 2 %",
-        "coloured torque noise with spikes, jittered stamps and lost samples. Every miss is listed.",
+        "Written by `experiments/trials.py` from `results/trials_*.jsonl`. MuJoCo drives the arm in closed loop,",
+        "inertials 5 % wrong; three recordings of 15 s; the IRB 140 and random robots of 1 to 7 joints with slides.",
+        "Strength is the effect's torque RMS as a share of its joint's: plain 20 %, masked 6 %, buried 2 %. A rough",
+        "log has encoders of 17 bits, 2 % coloured torque noise with spikes, jittered stamps and lost samples.",
+        "Every miss is listed.",
     ]
     for kind, title in TITLES.items():
         path = out / f"trials_{kind}.jsonl"

@@ -17,7 +17,7 @@ import numpy as np
 from irb140_jax import dynamics
 from irb140_jax.effects import AbstractEffect, Motion, RigidBody, Scales
 from irb140_jax.recordings.condition import Band, Conditioned
-from irb140_jax.robot import Robot
+from irb140_jax.robot import Robot, with_phi
 
 CHUNK = 2048  # samples per compiled call: recordings of any length reuse one program
 
@@ -193,6 +193,11 @@ def prepared(robot: Robot, recording: Conditioned) -> Prepared:
     rigid = RigidBody(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
     nominal = Y @ np.asarray(robot.phi).ravel() + np.asarray(robot.armature) * recording.qdd
     return Prepared(recording, Y, nominal + _passive(robot, recording), rigid)
+
+
+def with_inertials(along: Prepared, robot: Robot, phi: np.ndarray) -> Prepared:
+    """The same with sensitivities at other inertial parameters, shape (n, 10): those of a robot known better."""
+    return along._replace(rigid=prepared(with_phi(robot, jnp.asarray(phi)), along.recording).rigid)
 
 
 def columns_along(lib: Library, along: Prepared, loads: Loads | None = None) -> Columns:

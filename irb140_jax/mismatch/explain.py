@@ -17,6 +17,7 @@ from irb140_jax.mismatch.candidates import (
     prepared,
     scales_of,
     stretch,
+    with_inertials,
 )
 from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
 from irb140_jax.mismatch.model import composed
@@ -96,6 +97,8 @@ def explain(
         ex = _settled(lib, data, factor, chosen, ex.noise if ex else None)
         if turn < PASSES - 1:
             post = full_posterior(data, ex.problem, ex.grams, ex.chosen)
+            phi = np.asarray(robot.phi) + fitted(data, post, ex.chosen, factor)[0].reshape(-1, 10)
+            along = [with_inertials(r, robot, phi) for r in along]
             loads = [_loads(lib, data, post, ex.chosen, factor, r) for r in along]
             lib, chosen = _refined(lib, ex, scales)
     assert ex is not None, "PASSES is at least one"

@@ -10,7 +10,7 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.candidates import Candidate, Columns, Library, columns_along, prepared
+from irb140_jax.mismatch.candidates import Candidate, Columns, Library, columns_along, prepared, with_inertials
 from irb140_jax.recordings.condition import Band, Conditioned, condition
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
@@ -120,7 +120,7 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     nominal_phi = np.asarray(model.robot.phi)
     shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
     amplitudes = [named.amplitudes for named in model.named]
-    along = prepared(model.robot, recording)
+    along = with_inertials(prepared(model.robot, recording), model.robot, model.phi_corrected)
     torques = composed(lib, columns_along(lib, along), candidates, amplitudes, *shifts)
     if not model.named:
         return torques

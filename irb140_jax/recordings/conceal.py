@@ -254,7 +254,7 @@ def _torque_noise(noise: Noise, shape: tuple[int, int], dt: float, rng: np.rando
     white = rng.normal(size=shape)
     if noise.colour > 0.0:
         a = noise.colour ** (dt / 0.01)
-        white = signal.lfilter([np.sqrt(1.0 - a**2)], [1.0, -a], white, axis=0)
+        white = np.asarray(signal.lfilter([np.sqrt(1.0 - a**2)], [1.0, -a], white, axis=0))
     if noise.spikes > 0.0:
         hit = rng.random(shape) < noise.spikes
         white = white + hit * rng.uniform(10.0, 30.0, size=shape) * rng.choice([-1.0, 1.0], size=shape)
