@@ -115,18 +115,18 @@ class Case:
         return learned.Task(robot, penalty, self.direction, self.velocities, self.loss)
 
 
-NEAR_SINGULAR = Case("inverse", "branch", "4 x 122", 80, loss="mae")
+NEAR_SINGULAR = Case("inverse", "branch", "4 x 122", 60, loss="mae")
 CASES = (
     Case("forward", "task", "1 x 50", 1500, 250),
-    Case("forward", "task", "1 x 50", 200, 250, refined=200),
-    Case("inverse", "task", "1 x 50", 200, 250, refined=200),
+    Case("forward", "task", "1 x 50", 20, 250, refined=300),
+    Case("inverse", "task", "1 x 50", 20, 250, refined=300),
     Case("forward", "task", "4 x 122", 600, 1000),
     NEAR_SINGULAR,
     dataclasses.replace(NEAR_SINGULAR, penalty="log", weight=1e-3),
     dataclasses.replace(NEAR_SINGULAR, penalty="log", weight=1e-2),
     dataclasses.replace(NEAR_SINGULAR, penalty="hinge", weight=1e-3),
     dataclasses.replace(NEAR_SINGULAR, penalty="sigmoid", weight=1e-2),
-    Case("inverse", "task", "4 x 122", 300, 500),
+    Case("inverse", "task", "4 x 122", 250, 500),
     Case("forward", "task", "1 x 50", 400, 250, velocities=True),
     Case("forward", "whole", "4 x 122", 200, 500),
     # At a rate of 0.01 layers as wide as these are thrown out of the workspace by the first steps.
