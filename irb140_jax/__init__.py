@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from irb140_jax import robot as robot
     from irb140_jax import simulate as simulate
     from irb140_jax import swarm as swarm
+    from irb140_jax.mismatch import load_corrected as load_corrected
     from irb140_jax.robot import Robot as Robot
     from irb140_jax.robot import load_robot as load_robot
 
@@ -33,14 +34,14 @@ _SUBPACKAGES = (
     "control", "dynamics", "effects", "identify", "kinematics", "learned", "mismatch", "oracle", "recordings", "report",
     "robot", "simulate", "swarm",
 )
-_FROM_ROBOT = ("Robot", "load_robot")
-__all__ = [*_SUBPACKAGES, *_FROM_ROBOT]  # pyright: ignore[reportUnsupportedDunderAll]
+_REEXPORTED = {"Robot": "robot", "load_robot": "robot", "load_corrected": "mismatch"}
+__all__ = [*_SUBPACKAGES, *_REEXPORTED]  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str):
     """Import a public name when it is first used."""
     if name in _SUBPACKAGES:
         return importlib.import_module(f"irb140_jax.{name}")
-    if name in _FROM_ROBOT:
-        return getattr(importlib.import_module("irb140_jax.robot"), name)
+    if name in _REEXPORTED:
+        return getattr(importlib.import_module(f"irb140_jax.{_REEXPORTED[name]}"), name)
     raise AttributeError(f"module 'irb140_jax' has no attribute {name!r}; it has {', '.join(__all__)}")

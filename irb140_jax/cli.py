@@ -90,18 +90,19 @@ class Predict:
 
         import pandas as pd
 
-        from irb140_jax.mismatch import load_model, predict
+        from irb140_jax.mismatch import load_model, predict, prediction_times
         from irb140_jax.recordings import read_recording
 
         model = load_model(self.folder)
         recording = read_recording(self.recording, model.robot, columns=self.columns)
         torque = predict(model, recording)
-        table = {"t": recording.t}
+        t = prediction_times(recording)
+        table = {"t": t}
         for name in ("nominal", "refit", "corrected"):
             table |= {f"tau_{name}.{joint}": torque[name][:, i] for i, joint in enumerate(recording.joint_names)}
         with whole_file(self.out) as path:
             pd.DataFrame(table).to_csv(path, index=False, float_format="%.9g")
-        print(f"{self.out}: {len(recording.t)} rows")
+        print(f"{self.out}: {len(t)} rows")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -154,13 +155,40 @@ class Excite:
     """Folder of a diagnosis."""
 
     out: OutFile
-    """CSV file with t, q.<joint>: the motion to play."""
+    """CSV file with t, q.<joint>, qd.<joint>, qdd.<joint>: the motion to play, from rest to rest."""
+
+    duration: Annotated[float, arg(metavar="SECONDS")] = 40.0
+    """About how long the motion may last."""
+
+    rate: Annotated[float, arg(metavar="HZ")] = 250.0
+    """Rows per second."""
+
+    seed: int = 0
+    """Of the search; the same seed gives the same motion."""
 
     def run(self) -> None:
-        raise InputError(
-            "excite: this version can't design motions yet; the report's section 'What this motion could not have "
-            "shown' and the lines 'To separate them' of its findings say in words what to record"
-        )
+        from irb140_jax.report.folder import check_file, whole_file
+
+        check_file(self.out)
+        if self.seed < 0:
+            raise InputError(f"--seed {self.seed}: it has to be 0 or larger")
+
+        import pandas as pd
+
+        from irb140_jax.mismatch import load_model, load_undecided, propose
+        from irb140_jax.recordings.excite import motion_columns
+        from irb140_jax.report import proposal_sentences
+
+        robot, open_ = load_model(self.folder).robot, load_undecided(self.folder)
+        with _progress() as progress:
+            proposal = propose(
+                robot, open_, seed=self.seed, duration=self.duration, rate=self.rate, progress=progress
+            )
+        table = pd.DataFrame(motion_columns(proposal.motion, robot.joint_names))
+        with whole_file(self.out) as path:
+            table.to_csv(path, index=False, float_format="%.9g")
+        print(*proposal_sentences(robot, open_, proposal), sep="\n")
+        print(f"{self.out}: {len(table)} rows, {self.rate:g} a second")
 
 
 Command = (
@@ -182,10 +210,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     try:
         command = _parsed(argv)
-        if not isinstance(command, Excite):
-            from irb140_jax.compilation_cache import set_up_compilation_cache
+        from irb140_jax.compilation_cache import set_up_compilation_cache
 
-            set_up_compilation_cache()
+        set_up_compilation_cache()
         command.run()
     except InputError as error:
         print("irb140: " + " ".join(str(error).split()), file=sys.stderr)

@@ -153,7 +153,7 @@ def test_the_help_imports_nothing_heavy():
         (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "-0.1"], "--inertial-uncertainty"),
         (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "nan"], "--inertial-uncertainty"),
         (["demo", "--seed", "-1"], "--seed"),
-        (["excite", "d", "--out", "f.csv"], "excite"),
+        (["excite", "d", "--out", "f.csv"], "model.json"),
     ],
 )
 def test_wrong_words_on_the_command_line_give_one_line_that_names_them(words, named, capsys, tmp_path, monkeypatch):

@@ -230,7 +230,7 @@ def _derivatives(t):
 
 def corrected_model(robot, *named):
     phi = np.asarray(robot.phi)
-    return CorrectedModel(robot, phi, 1.1 * phi, named, BAND)
+    return CorrectedModel(robot, phi, 1.1 * phi, named, BAND, np.full(robot.n, 1e-3))
 
 
 @pytest.mark.parametrize("rate", [125.0, 500.0])

@@ -288,6 +288,18 @@ def test_columns_are_the_formula_of_the_contract(effect):
 
 
 @every_effect
+def test_an_effect_that_names_no_history_looks_at_the_present_only(effect):
+    joints, shape = a_shape(effect)
+    m = motion()
+    row = lambda k: jax.tree.map(lambda x: x[k : k + 1] if x.ndim and len(x) == 60 else x, m)  # noqa: E731
+    whole = effect.columns(m, joints, shape)
+    alone = jnp.concatenate([effect.columns(row(k), joints, shape) for k in (0, 7, 59)])
+    same = np.allclose(alone, whole[jnp.array([0, 7, 59])], rtol=1e-12, atol=1e-12)
+    by_rates = effect.slug in ("actuator_lag", "time_delay", "joint_elasticity")  # a motion gives those beside the load
+    assert same == (effect.history is None or by_rates)
+
+
+@every_effect
 def test_zero_strength_is_no_torque(effect):
     joints, shape = a_shape(effect)
     columns = effect.columns(motion(), joints, shape)
@@ -429,7 +441,8 @@ def test_a_model_corrected_by_effects_of_zero_strength_predicts_the_nominal_torq
         width = max(max(v) for v in effect.variants) + 1
         named.append(Named(effect, tuple(joints.tolist()), tuple(range(width)), np.zeros(width), np.asarray(shape)))
     phi = np.asarray(arm.phi)
-    model = CorrectedModel(arm, phi, phi, tuple(named), Band(torque=10.0, position=16.0, rate=200.0, step=4))
+    band = Band(torque=10.0, position=16.0, rate=200.0, step=4)
+    model = CorrectedModel(arm, phi, phi, tuple(named), band, np.full(arm.n, 1e-3))
     t = np.arange(0.0, 2.0, 0.005)
     q = np.sin(t[:, None] * np.arange(1.0, 5.0))
     out = predict(model, Recording(t, q, np.zeros_like(q), arm.joint_names))

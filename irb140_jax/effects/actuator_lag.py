@@ -1,5 +1,6 @@
 """Actuator lag: the real torque follows the logged one with a delay of first order."""
 
+import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
@@ -20,9 +21,22 @@ class ActuatorLag(AbstractEffect):
         "viscous_friction": "two excitation frequencies: the phase of a lag grows with frequency",
     }
     needs = "fast changes of this joint's torque"
+    history = "lets through what was asked for a moment before"
+    steps = True
+    not_in_mjcf = (
+        "it is left out: an actuator with dyntype filter has it, but then a torque is no longer that of one instant"
+    )
 
     def columns(self, motion, joints, shape):
         return of_site(motion.total_rate, joints)[:, :, None]
+
+    def memory(self, q, tau):
+        return tau
+
+    def step(self, memory, q, tau, w, shape, dt):
+        # Exact for a torque held over the step; a lag of zero lets it through at once.
+        real = tau + (memory - tau) * jnp.where(w > 0.0, jnp.exp(-dt / jnp.where(w > 0.0, w, 1.0)), 0.0)
+        return jnp.zeros((len(q), 1)), real, real
 
     def physical(self, w, shape):
         return w

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.native import with_joint, with_spring
 
 
 class AsymmetricFriction(AbstractEffect):
@@ -24,6 +25,8 @@ class AsymmetricFriction(AbstractEffect):
     feigned = 0.02  # errors of other laws are the same in both directions
     friction = True
     dissipative = True
+    mjcf = "joint frictionloss for the mean of both directions, a constant spring torque for half their difference"
+    not_in_mjcf = "at rest the difference of the two directions stays on, as a constant torque"
 
     def columns(self, motion, joints, shape):
         s = of_site(motion.direction(), joints)
@@ -37,6 +40,10 @@ class AsymmetricFriction(AbstractEffect):
 
     def lowest(self, robot, joints):
         return -np.repeat(np.asarray(robot.frictionloss)[joints], 2)
+
+    def in_model(self, robot, joints, w, shape):
+        level = with_joint(robot, "frictionloss", joints[0], 0.5 * (w[0] + w[1]))
+        return with_spring(level, joints[0], 0.0, 0.5 * (w[0] - w[1]))
 
     def where(self, names, values, units):
         return (

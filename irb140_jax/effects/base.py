@@ -107,9 +107,13 @@ class AbstractEffect(abc.ABC):
         ordinary: Nearly every machine has it: rarer laws must beat it clearly.
         friction: It rubs inside the transmission, so it is no part of the load that the transmission carries.
         dissipative: It can only take energy out of the arm, at every instant.
-        mjcf: How MJCF expresses it, or None.
+        mjcf: How MJCF expresses it, all of it or a part (see `in_model`), or None.
+        not_in_mjcf: What of it MJCF can't express and why, one sentence without its full stop; "" where nothing is.
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
         scouts: Its grid of shapes is looked for in the residual (see `scout`).
+        own: The column that makes it what it is; the others, if any, belong to a special case or refine it.
+        history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
+        steps: Whether it can be simulated forward in time all the same (see `memory` and `step`).
     """
 
     slug: ClassVar[str]
@@ -126,8 +130,12 @@ class AbstractEffect(abc.ABC):
     friction: ClassVar[bool] = False
     dissipative: ClassVar[bool] = False
     mjcf: ClassVar[str | None] = None
+    not_in_mjcf: ClassVar[str] = "MJCF has no such torque"
     everywhere: ClassVar[bool] = False
     scouts: ClassVar[bool] = False
+    own: ClassVar[int] = -1
+    history: ClassVar[str | None] = None
+    steps: ClassVar[bool] = False
 
     def sites(self, robot: Robot) -> np.ndarray:
         """Groups of joints at which the effect can act, shape (sites, joints per site); by default each joint alone."""
@@ -184,6 +192,42 @@ class AbstractEffect(abc.ABC):
         """Largest admissible amplitude of each column; beyond it another cause is to be looked for."""
         del robot, joints
         return np.full(max(max(v) for v in self.variants) + 1, np.inf)
+
+    def memory(self, q: Float[Array, " m"], tau: Float[Array, " m"]) -> Float[Array, " s"]:
+        """What it remembers after standing still at q, positions of the site, under the torque tau."""
+        del q, tau
+        return jnp.zeros(0)
+
+    def step(
+        self, memory: Float[Array, " s"], q: Float[Array, " m"], tau: Float[Array, " m"], w: Float[Array, " k"],
+        shape: Float[Array, " s"], dt: Float[Array, ""],
+    ) -> tuple[Float[Array, "m k"], Float[Array, " m"], Float[Array, " s"]]:
+        """One step of a simulation, for effects whose torque depends on what was before.
+
+        Args:
+            memory: From `memory` or the step before.
+            q: Positions of the site's joints [rad or m].
+            tau: Torque that the drives of the site are asked for [N m or N].
+            w: Amplitudes.
+            shape: Shape parameters.
+            dt: Length of the step [s].
+
+        Returns:
+            Columns at this instant, the torque that the drives really give, and the memory after the step.
+        """
+        raise NotImplementedError(f"{self.slug} can't be simulated forward in time")
+
+    def in_model(self, robot: Robot, joints: tuple[int, ...], w: np.ndarray, shape: np.ndarray) -> Robot:
+        """The robot with as much of this effect in its own numbers as those, and so MJCF, can hold.
+
+        Args:
+            robot: Arm with concrete numbers.
+            joints: The site.
+            w: Amplitudes of all columns, shape (k,).
+            shape: Shape parameters, shape (s,).
+        """
+        del joints, w, shape
+        return robot
 
     @abc.abstractmethod
     def where(self, names: str, values: dict[str, float], units: dict[str, str]) -> str:

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.native import with_joint
 
 
 class CoulombFriction(AbstractEffect):
@@ -26,6 +27,7 @@ class CoulombFriction(AbstractEffect):
     friction = True
     dissipative = True
     mjcf = "joint frictionloss"
+    not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):
         return of_site(motion.direction(), joints)[:, :, None]
@@ -38,6 +40,9 @@ class CoulombFriction(AbstractEffect):
 
     def lowest(self, robot, joints):
         return -np.asarray(robot.frictionloss)[joints]
+
+    def in_model(self, robot, joints, w, shape):
+        return with_joint(robot, "frictionloss", joints[0], w[0])
 
     def where(self, names, values, units):
         level = f"{values['coulomb']:.3g} {units['coulomb']}"

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.native import with_joint
 
 
 class EncoderOffset(AbstractEffect):
@@ -22,6 +23,8 @@ class EncoderOffset(AbstractEffect):
     }
     needs = "postures in which the slope of gravity over this joint changes sign; or its zero mark"
     everywhere = True
+    mjcf = "joint ref"
+    not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):
         return -jnp.take(motion.rigid.by_q, joints, axis=2)
@@ -31,6 +34,9 @@ class EncoderOffset(AbstractEffect):
 
     def amplitudes(self, values):
         return np.array([values["offset"]]), np.zeros(0)
+
+    def in_model(self, robot, joints, w, shape):
+        return with_joint(robot, "reference", joints[0], w[0])
 
     def where(self, names, values, units):
         offset = f"{values['offset']:.3g} {units['offset']}"

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.native import with_spring
 
 
 class GravitySpring(AbstractEffect):
@@ -22,6 +23,8 @@ class GravitySpring(AbstractEffect):
     }
     needs = "the whole range of the joint, in several postures of the others"
     mjcf = "joint stiffness and springref"
+    not_in_mjcf = ""
+    own = 0
 
     def columns(self, motion, joints, shape):
         q = of_site(motion.q, joints)
@@ -35,6 +38,9 @@ class GravitySpring(AbstractEffect):
 
     def lowest(self, robot, joints):
         return np.array([-float(robot.stiffness[joints[0]]), -np.inf])  # no spring pushes away from its rest
+
+    def in_model(self, robot, joints, w, shape):
+        return with_spring(robot, joints[0], w[0], w[1])
 
     def where(self, names, values, units):
         return (

@@ -1,7 +1,9 @@
 """Gravity tilt: the base is not level."""
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
 
@@ -21,6 +23,8 @@ class GravityTilt(AbstractEffect):
     }
     needs = "postures whose gravity torques don't all scale together, with the first joint swept"
     everywhere = True
+    mjcf = "option gravity"
+    not_in_mjcf = ""
 
     def sites(self, robot):
         return np.arange(robot.n)[None, :]
@@ -35,5 +39,22 @@ class GravityTilt(AbstractEffect):
         direction = values.get("direction", 0.0)
         return values["tilt"] * np.array([np.cos(direction), np.sin(direction)]), np.zeros(0)
 
+    def in_model(self, robot, joints, w, shape):
+        g = np.asarray(robot.gravity)
+        leant = g + np.linalg.norm(g) * np.asarray(w) @ np.asarray(across(robot.gravity))
+        return eqx.tree_at(lambda r: r.gravity, robot, jnp.asarray(leant))
+
     def where(self, names, values, units):
         return f"{names}: in the torque of gravity, at rest too; the base leans by {np.degrees(values['tilt']):.3g} deg"
+
+
+def across(gravity: Float[Array, "3"]) -> Float[Array, "2 3"]:
+    """Two unit vectors across gravity, the directions of the two components of the tilt; any two where there is none.
+
+    The first is square to the axis along which gravity has least.
+    """
+    size = jnp.linalg.norm(gravity)
+    down = jnp.where(size > 0, gravity / jnp.where(size > 0, size, 1.0), jnp.array([0.0, 0.0, -1.0]))
+    first = jnp.cross(down, jnp.eye(3)[jnp.argmin(jnp.abs(down))])
+    first = first / jnp.linalg.norm(first)
+    return jnp.stack([first, jnp.cross(down, first)])

@@ -22,6 +22,8 @@ class JointElasticity(AbstractEffect):
     }
     needs = "fast motion near the first resonance, or large gravity of either sign"
     everywhere = True
+    history = "bends with the rate of its load, which takes a state of the link beside that of the motor"
+    not_in_mjcf = "it is left out: a flexible joint takes a second joint, and the model another size"
 
     def columns(self, motion, joints, shape):
         rigid = motion.rigid

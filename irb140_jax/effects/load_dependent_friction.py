@@ -5,6 +5,7 @@ import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
 from irb140_jax.effects.coulomb_friction import dry_friction_columns
+from irb140_jax.effects.native import with_joint
 
 
 class LoadDependentFriction(AbstractEffect):
@@ -25,6 +26,8 @@ class LoadDependentFriction(AbstractEffect):
     needs = "motion in both directions under clearly different loads"
     friction = True
     dissipative = True
+    mjcf = "joint frictionloss, for its constant part"
+    not_in_mjcf = "the part that grows with the load is left out: frictionloss knows no load"
 
     def columns(self, motion, joints, shape):
         load = jnp.abs(of_site(motion.load, joints))
@@ -38,6 +41,9 @@ class LoadDependentFriction(AbstractEffect):
 
     def lowest(self, robot, joints):
         return np.array([-float(robot.frictionloss[joints[0]]), 0.0])
+
+    def in_model(self, robot, joints, w, shape):
+        return with_joint(robot, "frictionloss", joints[0], w[0])
 
     def where(self, names, values, units):
         return (

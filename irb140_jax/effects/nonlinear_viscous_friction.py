@@ -25,6 +25,7 @@ class NonlinearViscousFriction(AbstractEffect):
     feigned = 0.06  # every lubricant bends a little: Coulomb and viscous friction fit real joints to some percent
     friction = True
     dissipative = True
+    not_in_mjcf = "it is left out: joint damping is in proportion to speed"
 
     def shapes(self, scales, joints):
         return np.array([0.2, 0.35, 0.5, 0.65, 0.8, 1.3, 1.6, 1.9, 2.3, 3.0])[:, None]

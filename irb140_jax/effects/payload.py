@@ -1,8 +1,10 @@
 """Payload: a mass on the last link that the model doesn't know."""
 
+import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.robot import with_phi
 
 
 class Payload(AbstractEffect):
@@ -19,8 +21,10 @@ class Payload(AbstractEffect):
         "torque_gain": "a known payload, on and off",
     }
     needs = "gravity and acceleration of the last link in several orientations"
-    mjcf = "a body on the last link"
+    mjcf = "the last link's inertial"
     everywhere = True
+    not_in_mjcf = ""
+    own = 0
 
     def sites(self, robot):
         return np.arange(robot.n)[None, :]
@@ -38,6 +42,9 @@ class Payload(AbstractEffect):
 
     def lowest(self, robot, joints):
         return np.concatenate([[0.0], np.full(9, -np.inf)])
+
+    def in_model(self, robot, joints, w, shape):
+        return with_phi(robot, robot.phi.at[-1].add(jnp.asarray(w)))
 
     def where(self, names, values, units):
         return f"{names}: in the weight and inertia of the last link, {values['mass']:.3g} kg more than the model knows"

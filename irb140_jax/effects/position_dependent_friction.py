@@ -7,6 +7,7 @@ import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
 from irb140_jax.effects.coulomb_friction import dry_friction_columns
+from irb140_jax.effects.native import with_joint
 
 CENTRES, WIDTHS = 8, 3  # grid points of the two shape parameters
 
@@ -33,6 +34,8 @@ class PositionDependentFriction(AbstractEffect):
     needs = "motion in both directions over the whole range of the joint"
     friction = True
     dissipative = True
+    mjcf = "joint frictionloss, for its constant part"
+    not_in_mjcf = "the change along the range is left out: frictionloss knows no position"
 
     def shapes(self, scales, joints):
         low, high = float(scales.low[joints[0]]), float(scales.high[joints[0]])
@@ -63,6 +66,9 @@ class PositionDependentFriction(AbstractEffect):
 
     def lowest(self, robot, joints):
         return np.array([-float(robot.frictionloss[joints[0]]), -np.inf])
+
+    def in_model(self, robot, joints, w, shape):
+        return with_joint(robot, "frictionloss", joints[0], w[0])
 
     def where(self, names, values, units):
         return (

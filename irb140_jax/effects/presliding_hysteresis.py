@@ -5,6 +5,7 @@ import numpy as np
 from jax import lax
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, geometric_grid, of_site
+from irb140_jax.effects.native import with_joint
 
 
 class PreslidingHysteresis(AbstractEffect):
@@ -28,6 +29,10 @@ class PreslidingHysteresis(AbstractEffect):
     }
     needs = "micro-motion: slow reversals in which the joint turns less than a degree"
     friction = True
+    history = "remembers how far its bristles were bent since the last reversal"
+    steps = True
+    mjcf = "joint frictionloss, for the level once it slips"
+    not_in_mjcf = "the springy motion before it slips is left out: frictionloss has none"
 
     def shapes(self, scales, joints):
         span = max(float(scales.high[joints[0]] - scales.low[joints[0]]), 1e-9)
@@ -43,6 +48,15 @@ class PreslidingHysteresis(AbstractEffect):
         _, z = lax.associative_scan(lambda a, b: (a[0] * b[0], a[1] * b[0] + b[1]), (keep, jnp.sign(dq) * (1.0 - keep)))
         return z[:, :, None]
 
+    def memory(self, q, tau):
+        return jnp.concatenate([q, jnp.zeros_like(q)])
+
+    def step(self, memory, q, tau, w, shape, dt):
+        before, z = jnp.split(memory, 2)
+        keep = jnp.exp(-jnp.abs(q - before) / shape[0])
+        z = keep * z + (1.0 - keep) * jnp.sign(q - before)
+        return z[:, None], tau, jnp.concatenate([q, z])
+
     def physical(self, w, shape):
         return jnp.stack([w[0], w[0] / shape[0]])
 
@@ -51,6 +65,9 @@ class PreslidingHysteresis(AbstractEffect):
 
     def lowest(self, robot, joints):
         return np.zeros(1)
+
+    def in_model(self, robot, joints, w, shape):
+        return with_joint(robot, "frictionloss", joints[0], w[0])
 
     def where(self, names, values, units):
         return (

@@ -3,6 +3,7 @@
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.native import with_joint
 
 
 class RotorInertia(AbstractEffect):
@@ -20,6 +21,7 @@ class RotorInertia(AbstractEffect):
     }
     needs = "high acceleration of the joint, with the joints before it moving too"
     mjcf = "joint armature"
+    not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):
         return of_site(motion.qdd, joints)[:, :, None]
@@ -32,6 +34,9 @@ class RotorInertia(AbstractEffect):
 
     def lowest(self, robot, joints):
         return -np.asarray(robot.armature)[joints]
+
+    def in_model(self, robot, joints, w, shape):
+        return with_joint(robot, "armature", joints[0], w[0])
 
     def where(self, names, values, units):
         return f"{names}: in proportion to the joint's own acceleration, {values['inertia']:.3g} {units['inertia']}"

@@ -5,6 +5,7 @@ import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, geometric_grid, of_site
 from irb140_jax.effects.coulomb_friction import dry_friction_columns
+from irb140_jax.effects.native import with_joint
 
 
 class StribeckFriction(AbstractEffect):
@@ -29,6 +30,8 @@ class StribeckFriction(AbstractEffect):
     needs = "slow motion: constant speeds below and above the Stribeck speed"
     friction = True
     dissipative = True
+    mjcf = "joint frictionloss, for its constant part"
+    not_in_mjcf = "the rise at low speed is left out: frictionloss knows no speed"
 
     def shapes(self, scales, joints):
         speed, rest = float(scales.speed[joints[0]]), float(scales.rest_speed[joints[0]])
@@ -50,6 +53,9 @@ class StribeckFriction(AbstractEffect):
 
     def lowest(self, robot, joints):
         return np.array([-float(robot.frictionloss[joints[0]]), 0.0])
+
+    def in_model(self, robot, joints, w, shape):
+        return with_joint(robot, "frictionloss", joints[0], w[0])
 
     def where(self, names, values, units):
         return (

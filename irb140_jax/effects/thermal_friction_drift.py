@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, geometric_grid, of_site
+from irb140_jax.effects.native import with_joint
 
 
 class ThermalFrictionDrift(AbstractEffect):
@@ -27,6 +28,8 @@ class ThermalFrictionDrift(AbstractEffect):
     needs = "the same motion from cold until warm"
     friction = True
     dissipative = True
+    mjcf = "joint damping, as it is once warm"
+    not_in_mjcf = "the drift is left out: damping doesn't change with time"
 
     def shapes(self, scales, joints):
         duration = max(scales.duration, 1.0)
@@ -49,6 +52,9 @@ class ThermalFrictionDrift(AbstractEffect):
 
     def lowest(self, robot, joints):
         return np.array([0.0, -np.inf])
+
+    def in_model(self, robot, joints, w, shape):
+        return with_joint(robot, "damping", joints[0], w[0] - w[1])
 
     def where(self, names, values, units):
         return (

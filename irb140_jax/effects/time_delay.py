@@ -20,6 +20,8 @@ class TimeDelay(AbstractEffect):
     }
     needs = "fast motion of several joints"
     everywhere = True
+    history = "is in the clocks of the log, which shows a torque beside an earlier position"
+    not_in_mjcf = "it is in the clocks of the log, not in the arm"
 
     def sites(self, robot):
         return np.arange(robot.n)[None, :]

@@ -3,6 +3,7 @@
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.native import with_gear
 
 LARGEST = 1.5  # torque constants are known better than that; a model's torque full of noise feigns larger gains
 
@@ -22,6 +23,8 @@ class TorqueGain(AbstractEffect):
         "load_dependent_friction": "the same loads while standing still",
     }
     needs = "large gravity torque on this joint that other joints' torques confirm, or a known payload"
+    mjcf = "actuator gear"
+    not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):
         return of_site(motion.total, joints)[:, :, None]
@@ -37,6 +40,9 @@ class TorqueGain(AbstractEffect):
 
     def highest(self, robot, joints):
         return np.full(1, LARGEST - 1.0)
+
+    def in_model(self, robot, joints, w, shape):
+        return with_gear(robot, joints[0], 1.0 / (1.0 + w[0]))
 
     def where(self, names, values, units):
         return (

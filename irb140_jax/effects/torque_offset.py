@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.native import with_spring
 
 
 class TorqueOffset(AbstractEffect):
@@ -21,6 +22,8 @@ class TorqueOffset(AbstractEffect):
         "asymmetric_friction": "dwells: an offset stays at rest, friction does not",
     }
     needs = "postures with clearly different gravity torque"
+    mjcf = "joint stiffness and springref: a very soft spring, bent far"
+    not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):
         return jnp.ones_like(of_site(motion.q, joints))[:, :, None]
@@ -30,6 +33,9 @@ class TorqueOffset(AbstractEffect):
 
     def amplitudes(self, values):
         return np.array([values["offset"]]), np.zeros(0)
+
+    def in_model(self, robot, joints, w, shape):
+        return with_spring(robot, joints[0], 0.0, w[0])
 
     def where(self, names, values, units):
         return f"{names}: {values['offset']:.3g} {units['offset']} at all positions, speeds and times"

@@ -23,6 +23,7 @@ class TorqueRipple(AbstractEffect):
     }
     needs = "slow motion through the whole range of the joint"
     scouts = True
+    not_in_mjcf = "it is left out: no joint torque of MJCF is periodic in position"
 
     def shapes(self, scales, joints):
         return np.geomspace(1.0, 30.0, POINTS)[:, None] / self._span(scales, joints)

@@ -19,6 +19,9 @@ class TransmissionCoupling(AbstractEffect):
     needs = "the two joints moving at speeds that are not in proportion"
     friction = True
     dissipative = True
+    not_in_mjcf = (
+        "it is left out: a fixed tendon over both joints has it (damping, frictionloss), but a serial chain holds none"
+    )
 
     def sites(self, robot):
         pairs = [

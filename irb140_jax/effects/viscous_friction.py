@@ -3,6 +3,7 @@
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.native import with_joint
 
 
 class ViscousFriction(AbstractEffect):
@@ -24,6 +25,7 @@ class ViscousFriction(AbstractEffect):
     friction = True
     dissipative = True
     mjcf = "joint damping"
+    not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):
         return of_site(motion.qd, joints)[:, :, None]
@@ -36,6 +38,9 @@ class ViscousFriction(AbstractEffect):
 
     def lowest(self, robot, joints):
         return -np.asarray(robot.damping)[joints]
+
+    def in_model(self, robot, joints, w, shape):
+        return with_joint(robot, "damping", joints[0], w[0])
 
     def where(self, names, values, units):
         viscous = f"{values['viscous']:.3g} {units['viscous']}"

@@ -16,6 +16,7 @@ import numpy as np
 
 from irb140_jax import dynamics
 from irb140_jax.effects import AbstractEffect, Motion, RigidBody, Scales
+from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.recordings.condition import Band, Conditioned
 from irb140_jax.robot import Robot, with_phi
 
@@ -183,13 +184,8 @@ def prepared(robot: Robot, recording: Conditioned) -> Prepared:
     by_q = np.stack([(torque(bare, q + STEP * e, qd, qdd) - rest) / STEP for e in unit], axis=-1)
     by_qd = np.stack([(torque(bare, q, qd + STEP * e, qdd) - rest) / STEP for e in unit], axis=-1)
     mass = np.stack([torque(weightless, q, 0.0 * qd, 0.0 * qdd + e) for e in unit], axis=-1)
-    g = np.asarray(robot.gravity)
-    size = float(np.linalg.norm(g))
-    down = g / size if size > 0 else np.array([0.0, 0.0, -1.0])
-    first = np.cross(down, np.eye(3)[int(np.argmin(np.abs(down)))])
-    first /= np.linalg.norm(first)
-    across = np.stack([first, np.cross(down, first)])
-    arrays = (by_gravity, np.array(size), across, Y[..., -10:], by_q, by_qd, mass)
+    size = np.linalg.norm(np.asarray(robot.gravity))
+    arrays = (by_gravity, size, np.asarray(across(robot.gravity)), Y[..., -10:], by_q, by_qd, mass)
     rigid = RigidBody(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
     nominal = Y @ np.asarray(robot.phi).ravel() + np.asarray(robot.armature) * recording.qdd
     return Prepared(recording, Y, nominal + _passive(robot, recording), rigid)

@@ -12,11 +12,14 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
+from irb140_jax.mismatch.candidates import scales_of
 from irb140_jax.mismatch.evidence import posterior
 from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior
-from irb140_jax.mismatch.findings import findings, not_testable, ranking
+from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
 from irb140_jax.mismatch.prove import HeldOut, held_out, refit_problem, transferring
+from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
+from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
 from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
 from irb140_jax.recordings.condition import choose_band, condition
@@ -47,11 +50,13 @@ class Result:
         diagnosis: The contract's `diagnosis.json`.
         model: The corrected model, for predictions.
         views: Data for the report's figures.
+        undecided: What is open, for the design of a motion that decides it.
     """
 
     diagnosis: dict[str, Any]
     model: CorrectedModel
     views: dict[str, Any]
+    undecided: Undecided
 
 
 def diagnose(
@@ -104,24 +109,31 @@ def _diagnosed(
         proof = held_out(ex, refit_grams, refit_columns)
         rest = unexplained(ex, proof)
     found = findings(robot, ex)
-    model = _model(robot, ex, refit_grams, refit_columns, band)
-    diagnosis = _document(robot, ex, proof, found, rest, recordings)
-    return Result(diagnosis, model, _views(robot, ex, proof, model, recordings, smooth, diagnosis))
+    model = _model(robot, ex, refit_grams, refit_columns, band, scales_of(smooth).rest_speed)
+    scales = scales_of(smooth)
+    matters = reference(ex.lib, scales, band.rate)
+    seen = visibility(ex, matters)
+    diagnosis = _document(robot, ex, proof, found, rest, recordings, seen)
+    open_ = undecided(ex, found, seen, matters, band, scales, config.inertial_uncertainty)
+    return Result(diagnosis, model, _views(robot, ex, proof, model, recordings, smooth, diagnosis), open_)
 
 
-def _model(robot: Robot, ex: Explanation, refit_grams, refit_columns: np.ndarray, band) -> CorrectedModel:
+def _model(
+    robot: Robot, ex: Explanation, refit_grams, refit_columns: np.ndarray, band, rest_speed: np.ndarray
+) -> CorrectedModel:
     loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
     refit, _, _ = fitted(ex.data, posterior(refit_grams.total(), refit_columns), loose, ex.factor)
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     dphi, members, amplitudes = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)
     named = tuple(Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True))
-    return CorrectedModel(robot, phi + refit.reshape(phi.shape), phi + dphi.reshape(phi.shape), named, band)
+    phi_refit, phi_corrected = (phi + shift.reshape(phi.shape) for shift in (refit, dphi))
+    return CorrectedModel(robot, phi_refit, phi_corrected, named, band, rest_speed)
 
 
 def _document(
     robot: Robot, ex: Explanation, proof: HeldOut, found: list[dict[str, Any]], rest: list[Unexplained],
-    recordings: Sequence[Recording],
+    recordings: Sequence[Recording], seen: dict[Site, tuple[float, int]],
 ) -> dict[str, Any]:  # fmt: skip
     # Noise is what nothing predicts: less than what the findings leave, where structure without a name is left.
     floor = proof.floor.copy()
@@ -143,7 +155,7 @@ def _document(
         "verdict": kind,
         "findings": found,
         "unexplained": [unexplained_entry(robot, u) for u in rest],
-        "not_testable": not_testable(robot, ex, {f["effect"] for f in found}),
+        "not_testable": not_testable(robot, {f["effect"] for f in found}, seen),
         "fit": fit,
         "summary": summary(kind, found, rest, fit, inertials, robot, [r.source for r in recordings]),
     })  # fmt: skip

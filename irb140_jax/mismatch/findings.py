@@ -7,17 +7,13 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.evidence import eliminated
 from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.name import PREFER, group_odds
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
 from irb140_jax.robot import Robot
 
 WORTH_SAYING = 0.02  # alternatives less probable than this stay unsaid
-REFERENCE_SHARE = 0.06  # an effect of this share of the joint's torque should be seen ...
-VISIBLE = 5.0  # ... with this many standard deviations, or the motion can't test it
 
 
 def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
@@ -182,35 +178,6 @@ def _alternatives(robot: Robot, ex: Explanation, index: int) -> list[dict[str, A
 def _separation(one: AbstractEffect, other: AbstractEffect) -> str:
     motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
     return f"Record {motion}." if motion else f"Record {one.needs}; and, for {other.title}, {other.needs}."
-
-
-def not_testable(robot: Robot, ex: Explanation, found: set[str]) -> list[dict[str, Any]]:
-    """Effects that this motion could not have shown, with the joints where that is so."""
-    H, _ = eliminated(ex.problem.H, ex.problem.columns(ex.chosen))
-    blind: dict[str, list[tuple[int, ...]]] = {}
-    seen: dict[tuple[str, tuple[int, ...]], float] = {}
-    members = ex.members
-    for c in ex.data.candidates:
-        if c.slug == "inertials" or c.slug in found:
-            continue
-        if any(m.joints == c.joints and (c.slug in m.effect.contains or m.slug in c.effect.contains) for m in members):
-            continue  # part of a finding, or tested against it
-        columns = c.columns + ex.problem.offset
-        own, _ = eliminated(H, columns[:-1])
-        z = float(np.sqrt(max(own[columns[-1], columns[-1]], 0.0))) * REFERENCE_SHARE / TYPICAL_SHARE
-        key = (c.slug, c.joints)
-        seen[key] = max(seen.get(key, 0.0), z)
-    for (slug, joints), z in seen.items():
-        if z < VISIBLE:
-            blind.setdefault(slug, []).append(joints)
-    return [
-        {
-            "effect": slug,
-            "joints": [robot.joint_names[j] for j in sorted({j for joints in sites for j in joints})],
-            "needs": f"Needs {CATALOGUE[slug].needs}.",
-        }
-        for slug, sites in sorted(blind.items())
-    ]
 
 
 def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any]]:

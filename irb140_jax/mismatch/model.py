@@ -34,6 +34,12 @@ class Named:
     amplitudes: np.ndarray
     shape: np.ndarray
 
+    def all_amplitudes(self) -> np.ndarray:
+        """Amplitudes of every column of the effect, zero for those it doesn't use."""
+        full = np.zeros(max(max(v) for v in self.effect.variants) + 1)
+        full[list(self.variant)] = self.amplitudes
+        return full
+
 
 @dataclasses.dataclass(frozen=True)
 class Torques:
@@ -64,6 +70,7 @@ class CorrectedModel:
         phi_corrected: Inertial parameters refitted with the effects, shape (n, 10).
         named: The effects.
         band: Of the comparison.
+        rest_speed: Speed that the encoders of the recordings can't tell from rest [rad/s or m/s], shape (n,).
     """
 
     robot: Robot
@@ -71,6 +78,7 @@ class CorrectedModel:
     phi_corrected: np.ndarray
     named: tuple[Named, ...]
     band: Band
+    rest_speed: np.ndarray
 
 
 def composed(
@@ -129,10 +137,10 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
 
 
 def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray]:
-    """Torques of the diagnosed models along a new recording, one row a row of it.
+    """Torques of the diagnosed models along a new recording, one row a row of its file.
 
     Returns:
-        "nominal", "refit" and "corrected", each (T, n) [N m or N].
+        "nominal", "refit" and "corrected", each (rows, n) [N m or N], at the times `prediction_times`.
 
     Raises:
         InputError: The recording has other joints than the model.
@@ -144,11 +152,16 @@ def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray
         )
     smooth = condition(recording, model.band, pad=True)
     torques = torques_along(model, smooth)
-    out = {}
+    t, out = prediction_times(recording), {}
     for name in ("nominal", "refit", "corrected"):
         values = getattr(torques, name)
-        out[name] = np.stack([np.interp(recording.t, smooth.t, values[:, j]) for j in range(values.shape[1])], axis=1)
+        out[name] = np.stack([np.interp(t, smooth.t, values[:, j]) for j in range(values.shape[1])], axis=1)
     return out
+
+
+def prediction_times(recording: Recording) -> np.ndarray:
+    """Times at which `predict` gives torques [s]: one for every row of the file, repeated rows included."""
+    return recording.t if recording.file_t is None else recording.file_t
 
 
 def to_json(model: CorrectedModel) -> dict[str, Any]:
@@ -165,6 +178,7 @@ def to_json(model: CorrectedModel) -> dict[str, Any]:
         "phi_refit": model.phi_refit.tolist(),
         "phi_corrected": model.phi_corrected.tolist(),
         "band": dataclasses.asdict(model.band),
+        "rest_speed": model.rest_speed.tolist(),
         "effects": [
             {
                 "effect": n.effect.slug, "joints": list(n.joints), "variant": list(n.variant),
@@ -194,6 +208,7 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
             for e in data["effects"]
         ),
         Band(**data["band"]),
+        np.array(data["rest_speed"], dtype=float),
     )  # fmt: skip
 
 

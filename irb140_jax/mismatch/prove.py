@@ -10,6 +10,8 @@ from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.name import PREFER, simpler
 from irb140_jax.mismatch.noise import noise_from_residuals
 
+ALONE = 0.8  # share of a joint's usable rows from which a recording is the only one that says much of the joint
+
 
 @dataclasses.dataclass(frozen=True)
 class HeldOut:
@@ -36,10 +38,18 @@ class HeldOut:
 
 
 def folds(g: Grams) -> list[np.ndarray]:
-    """Blocks to leave out together: a recording each, or contiguous blocks of the only one."""
-    if len(set(g.recording)) > 1:
-        return [g.recording == r for r in sorted(set(g.recording))]
-    return [np.arange(len(g.recording)) == b for b in range(len(g.recording))]
+    """Blocks to leave out together: a recording each, or contiguous blocks of the only one.
+
+    A recording that all but alone moves some joint is left out by halves: without it nothing is known of that joint.
+    """
+    if len(set(g.recording)) == 1:
+        return [np.arange(len(g.recording)) == b for b in range(len(g.recording))]
+    out, rows = [], np.maximum(g.rows.sum(axis=0), 1)
+    for r in sorted(set(g.recording)):
+        mine = g.recording == r
+        halves = np.array_split(np.flatnonzero(mine), 2 if np.max(g.rows[mine].sum(axis=0) / rows) > ALONE else 1)
+        out += [np.isin(np.arange(len(mine)), half) for half in halves]
+    return out
 
 
 def refit_problem(ex: Explanation) -> tuple[Grams, np.ndarray]:

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from scipy import interpolate, signal
 
+from irb140_jax.errors import InputError
 from irb140_jax.recordings.concealed.catalogue import FIRST_NINE
 from irb140_jax.recordings.concealed.choice import Concealment as Concealment
 from irb140_jax.recordings.concealed.choice import chosen, meaningful_sites
@@ -150,6 +151,36 @@ def conceal(
     }
     secret = Secret(hidden, logs, rigid, true, nominal, survey)
     return ConcealedCase(recordings, str(mjcf), truth, seal(truth), secret)
+
+
+def record_again(
+    case: ConcealedCase, motions: Sequence[Excitation], *, seed: int, noise: Noise | None = None, rate: float = 500.0
+) -> tuple[Recording, ...]:
+    """Record more motions of the same arm, with the same physics hidden in it and the same sensors.
+
+    Args:
+        case: The arm, from `conceal`.
+        motions: What to play; sampled at the step of the engine.
+        seed: Of the noise; that of the case would repeat its noise.
+        noise: Sensor noise, by default that of a good arm.
+        rate: Samples per second of the recordings [1/s].
+
+    Raises:
+        InputError: A motion is sampled at another step than the engine's.
+    """
+    secret, first = case.secret, len(case.recordings)
+    dt, names = float(secret.true.opt.timestep), case.recordings[0].joint_names
+    recordings = []
+    for k, motion in enumerate(motions, start=first):
+        if abs(float(motion.t[1] - motion.t[0]) - dt) > 1e-9:
+            step = motion.t[1] - motion.t[0]
+            raise InputError(f"motion {motion.name!r} is sampled every {step:g} s; sample it every {dt:g} s")
+        log = closed_loop(secret.nominal, secret.true, secret.hidden, motion, recording=k)
+        rng = np.random.default_rng([seed, 31, k])
+        step = max(1, round(1.0 / (rate * dt)))
+        made = _recording(log, f"{motion.name}_{k}", names, secret.survey, noise or Noise(), step, False, rng)
+        recordings.append(made)
+    return tuple(recordings)
 
 
 def demo_case(seed: int, *, duration: float = 20.0, rate: float = 1000.0) -> ConcealedCase:

@@ -4,8 +4,11 @@ They start and end at rest and stay within the joint limits; where the model giv
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.robot import Robot
@@ -13,6 +16,7 @@ from irb140_jax.robot import Robot
 SPEED_GUESS = (2.0, 0.5)  # [rad/s], [m/s]: an industrial arm of middle size, used where the model gives no speed limit
 RANGE_GUESS = (2.0, 0.3)  # [rad], [m] either way of zero: used where the model gives no joint range
 RANGE_SHARE = 0.85  # of the joint range that a motion may use, so that tracking errors don't reach the stops
+LEAST_ROOM = 0.1  # [rad], [m] either way of where a joint without limits was seen to stand
 SPEED_UP_TIME = 0.25  # [s] to reach the speed limit: the acceleration limit is the speed limit divided by this
 
 
@@ -32,7 +36,17 @@ class Excitation(NamedTuple):
     qdd: np.ndarray
 
 
-class _Limits(NamedTuple):
+def motion_columns(motion: Excitation, joint_names: Sequence[str]) -> dict[str, np.ndarray]:
+    """A motion as the columns of a table, by the names of a recording: t, q.<joint>, qd.<joint>, qdd.<joint>."""
+    columns = {"t": motion.t}
+    for name in ("q", "qd", "qdd"):
+        columns |= {f"{name}.{joint}": getattr(motion, name)[:, i] for i, joint in enumerate(joint_names)}
+    return columns
+
+
+class Limits(NamedTuple):
+    """Positions, speeds and accelerations within which motions stay; each of shape (n,)."""
+
     lower: np.ndarray
     upper: np.ndarray
     speed: np.ndarray
@@ -62,7 +76,7 @@ def fourier_motion(
     Source: Swevers, Ganseman, Tuekel, De Schutter, Van Brussel, IEEE Trans. Robotics and Automation 13(5), 1997.
     """
     rng = np.random.default_rng([seed, 1])
-    limits, t = _limits(robot, speed), _time(duration, rate)
+    limits, t = motion_limits(robot, speed), sample_times(duration, rate)
     omega = 2.0 * math.pi * base_frequency * np.arange(1, harmonics + 1)
     amplitude = rng.normal(size=(harmonics, robot.n)) / np.sqrt(np.arange(1, harmonics + 1))[:, None]
     phase = rng.uniform(0.0, 2.0 * math.pi, size=(harmonics, robot.n))
@@ -70,7 +84,7 @@ def fourier_motion(
     wave = np.sum(amplitude * np.sin(angle), axis=1)
     wave_d = np.sum(omega[:, None] * amplitude * np.cos(angle), axis=1)
     wave_dd = -np.sum(omega[:, None] ** 2 * amplitude * np.sin(angle), axis=1)
-    w, wd, wdd = (x[:, None] for x in _fade(t, min(2.0, 0.2 * duration)))
+    w, wd, wdd = (x[:, None] for x in fade(t, min(2.0, 0.2 * duration)))
     shape, shape_d = w * wave, w * wave_d + wd * wave
     shape_dd = w * wave_dd + 2.0 * wd * wave_d + wdd * wave
     # The largest scale at which position, speed and acceleration all stay within their limits.
@@ -108,7 +122,7 @@ def point_to_point_motion(
         The motion, T = duration * rate samples; it ends with a dwell.
     """
     rng = np.random.default_rng([seed, 2])
-    limits, t = _limits(robot, speed), _time(duration, rate)
+    limits, t = motion_limits(robot, speed), sample_times(duration, rate)
     span = limits.upper - limits.lower
     point = limits.lower + span * rng.uniform(0.25, 0.75, size=robot.n)
     q, qd, qdd = np.empty((t.size, robot.n)), np.zeros((t.size, robot.n)), np.zeros((t.size, robot.n))
@@ -138,7 +152,24 @@ def three_motions(robot: Robot, duration: float = 20.0, rate: float = 1000.0, *,
     return [kind(robot, duration, rate, seed=seed) for kind in kinds]
 
 
-def _limits(robot: Robot, speed: float) -> _Limits:
+def within(robot: Robot, low: np.ndarray, high: np.ndarray, speed: np.ndarray | None = None) -> Robot:
+    """The robot with limits where the model gives none: where it was seen to be, and no faster than `speed`.
+
+    Args:
+        robot: Arm with n joints.
+        low, high: Lowest and highest positions seen [rad or m], shape (n,).
+        speed: Largest speeds allowed [rad/s or m/s], shape (n,); none by default.
+    """
+    room = np.maximum(LEAST_ROOM - 0.5 * (high - low), 0.0)
+    fill = lambda given, seen: jnp.asarray(np.where(np.isfinite(given), given, seen))  # noqa: E731
+    limits = (
+        fill(robot.lower, low - room), fill(robot.upper, high + room),
+        robot.velocity_limit if speed is None else fill(robot.velocity_limit, speed),
+    )  # fmt: skip
+    return eqx.tree_at(lambda r: (r.lower, r.upper, r.velocity_limit), robot, limits)
+
+
+def motion_limits(robot: Robot, speed: float) -> Limits:
     """Limits in force, guesses filled in, margins taken off, speed scaled; each of shape (n,)."""
     guess = lambda pair: np.where(robot.is_slide, pair[1], pair[0])  # noqa: E731
     lower, upper = np.asarray(robot.lower), np.asarray(robot.upper)
@@ -148,14 +179,15 @@ def _limits(robot: Robot, speed: float) -> _Limits:
     middle, half = 0.5 * (lower_in + upper_in), 0.5 * RANGE_SHARE * (upper_in - lower_in)
     limit = np.asarray(robot.velocity_limit)
     limit = np.where(np.isfinite(limit), limit, guess(SPEED_GUESS))
-    return _Limits(middle - half, middle + half, speed * limit, speed * limit / SPEED_UP_TIME)
+    return Limits(middle - half, middle + half, speed * limit, speed * limit / SPEED_UP_TIME)
 
 
-def _time(duration: float, rate: float) -> np.ndarray:
+def sample_times(duration: float, rate: float) -> np.ndarray:
+    """Evenly spaced times from zero, shape (duration * rate,)."""
     return np.arange(round(duration * rate)) / rate
 
 
-def _fade(t: np.ndarray, ramp: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def fade(t: np.ndarray, ramp: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A window from 0 to 1 and back to 0 with its two derivatives; speed and acceleration vanish at both ends."""
     rising = np.clip(t / ramp, 0.0, 1.0)
     falling = np.clip((t[-1] - t) / ramp, 0.0, 1.0)
@@ -165,7 +197,7 @@ def _fade(t: np.ndarray, ramp: float) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return window, slope, (60.0 * s - 180.0 * s**2 + 120.0 * s**3) / ramp**2
 
 
-def _inward(point: np.ndarray, step: np.ndarray, limits: _Limits) -> np.ndarray:
+def _inward(point: np.ndarray, step: np.ndarray, limits: Limits) -> np.ndarray:
     """The step, turned round or cut where it would leave the range."""
     inside = lambda s: (point + s >= limits.lower) & (point + s <= limits.upper)  # noqa: E731
     step = np.where(inside(step), step, -step)

@@ -60,7 +60,8 @@ def unchecked_recording(
     table = scaled(_numbers(table, used, path, notes), column_map)
     if "t" not in used:
         used.insert(0, "t")
-    rows = np.arange(1, len(table["t"]) + 1)
+    file_t = table["t"]
+    rows = np.arange(1, len(file_t) + 1)
     table, rows = repair.without_repeated_rows(table, rows, notes)
     table, rows = repair.without_missing_ends(table, used, rows, notes)
     check_times(table["t"], rows, path, notes)
@@ -78,6 +79,7 @@ def unchecked_recording(
         q=stacked([f"q.{joint}" for joint in joint_names]), tau=stacked([f"tau.{joint}" for joint in joint_names]),
         **{kind: stacked(names) for kind, names in complete.items()},
         extras={name: values for name, values in table.items() if name not in kept},
+        file_t=file_t if len(file_t) > len(table["t"]) else None,
     )
 
 

@@ -27,6 +27,7 @@ class Recording:
         extras: Every other column by its name, shape (T,); may hold NaN.
         source: File name, for messages.
         notes: Repairs made and oddities seen, one plain sentence each.
+        file_t: Time of every row of the file, those that reading left out included [s]; None where it left out none.
     """
 
     t: Float[np.ndarray, " T"]
@@ -38,6 +39,7 @@ class Recording:
     extras: dict[str, Float[np.ndarray, " T"]] = dataclasses.field(default_factory=dict)
     source: str = "recording"
     notes: tuple[str, ...] = ()
+    file_t: Float[np.ndarray, " rows"] | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.t), len(self.joint_names))
@@ -54,7 +56,7 @@ def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Rec
     return dataclasses.replace(
         recording, t=recording.t[rows], q=recording.q[rows], tau=recording.tau[rows], qd=cut(recording.qd),
         qdd=cut(recording.qdd), extras={k: v[rows] for k, v in recording.extras.items()},
-        source=recording.source if source is None else source,
+        source=recording.source if source is None else source, file_t=None,
     )
 
 

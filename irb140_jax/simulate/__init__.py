@@ -12,4 +12,6 @@ from irb140_jax.simulate.measures import energies as energies
 from irb140_jax.simulate.measures import response as response
 from irb140_jax.simulate.measures import roughness as roughness
 from irb140_jax.simulate.measures import tracking_error as tracking_error
+from irb140_jax.simulate.plant import AbstractPlant as AbstractPlant
+from irb140_jax.simulate.plant import play as play
 from irb140_jax.simulate.rollout import rollout as rollout

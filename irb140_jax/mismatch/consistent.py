@@ -1,0 +1,51 @@
+"""Inertial parameters that some body could have, nearest to those of a fit."""
+
+import numpy as np
+
+LEAST = 1e-3  # of the nominal mass, along any of its directions: a link thinner than that is rounding
+
+
+def consistent(phi: np.ndarray, nominal: np.ndarray) -> np.ndarray:
+    """The parameters, with mass taken from where a fit made it negative to where there is none.
+
+    Each link's pseudo-inertia is written in axes in which the nominal one is the unit matrix; eigenvalues below
+    `LEAST` are raised to it.  What is possible already stays as it is; a link without nominal mass keeps none.
+
+    Args:
+        phi: Inertial parameters, shape (n, 10).
+        nominal: Those of the model as given, shape (n, 10).
+
+    Source: Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter
+        identification, IEEE RA-L 3(1), 2018.
+    """
+    out = np.array(phi, dtype=float)
+    for i, (new, old) in enumerate(zip(phi, nominal, strict=True)):
+        try:
+            L = np.linalg.cholesky(pseudo_inertia(old))
+        except np.linalg.LinAlgError:
+            out[i] = old
+            continue
+        inverse = np.linalg.inv(L)
+        values, vectors = np.linalg.eigh(inverse @ pseudo_inertia(new) @ inverse.T)
+        if values.min() < LEAST:
+            root = L @ vectors
+            out[i] = _parameters(root @ np.diag(np.maximum(values, LEAST)) @ root.T)
+    return out
+
+
+def pseudo_inertia(phi: np.ndarray) -> np.ndarray:
+    """[[Sigma, h], [h', m]] with Sigma = tr(I)/2 - I, of one link about its frame, shape (4, 4)."""
+    inertia = np.zeros((3, 3))
+    inertia[np.triu_indices(3)] = phi[4:]
+    inertia = inertia + np.triu(inertia, 1).T
+    J = np.zeros((4, 4))
+    J[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    J[:3, 3] = J[3, :3] = phi[1:4]
+    J[3, 3] = phi[0]
+    return J
+
+
+def _parameters(J: np.ndarray) -> np.ndarray:
+    """The inverse of `pseudo_inertia`."""
+    inertia = np.trace(J[:3, :3]) * np.eye(3) - J[:3, :3]
+    return np.concatenate([[J[3, 3]], J[:3, 3], inertia[np.triu_indices(3)]])

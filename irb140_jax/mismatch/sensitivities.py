@@ -1,0 +1,84 @@
+"""What effects see of the rigid body, differentiated where they ask for it and not otherwise."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from irb140_jax.dynamics.chain import Plan, chain
+from irb140_jax.dynamics.newton_euler import rigid_torque
+from irb140_jax.dynamics.regressor import regressor_blocks
+from irb140_jax.effects.gravity_tilt import across
+from irb140_jax.robot import Robot
+from irb140_jax.types import JointSamples, Scalar
+
+
+class Sensitivities(eqx.Module):
+    """The fields of `effects.RigidBody`, as derivatives in JAX instead of differences.
+
+    Attributes:
+        robot: The nominal model.
+        ahead: Its plan.
+        q, qd, qdd: The motion, shape (T, n).
+    """
+
+    robot: Robot
+    ahead: Plan
+    q: JointSamples
+    qd: JointSamples
+    qdd: JointSamples
+
+    @property
+    def by_gravity(self) -> Float[Array, "T n 3"]:
+        """Torque per unit of each component of gravity in base axes."""
+        # The plan's last three numbers are gravity, whose zeros are none here.
+        unknown = Plan((*self.ahead.known[:-3], None, None, None), self.ahead.regroup, self.ahead.is_slide)
+        still = jnp.zeros_like(self.q).T
+
+        def torque(gravity):
+            arm = eqx.tree_at(lambda r: r.gravity, self.robot, gravity)
+            return rigid_torque(chain(arm, unknown), self.q.T, still, still).T
+
+        return jax.jacfwd(torque)(self.robot.gravity)
+
+    @property
+    def gravity(self) -> Scalar:
+        """Size of gravity."""
+        return jnp.linalg.norm(self.robot.gravity)
+
+    @property
+    def across(self) -> Float[Array, "2 3"]:
+        """Two unit vectors across gravity in base axes."""
+        return across(self.robot.gravity)
+
+    @property
+    def last_link(self) -> Float[Array, "T n 10"]:
+        """Torque per inertial parameter of the last link."""
+        block = regressor_blocks(chain(self.robot, self.ahead), self.q.T, self.qd.T, self.qdd.T)[-1]
+        return jnp.moveaxis(block, -1, 0)
+
+    @property
+    def by_q(self) -> Float[Array, "T n n"]:
+        """Derivative of the torque by joint positions, torque first."""
+        return self._by(0)
+
+    @property
+    def by_qd(self) -> Float[Array, "T n n"]:
+        """Derivative of the torque by joint velocities."""
+        return self._by(1)
+
+    @property
+    def mass(self) -> Float[Array, "T n n"]:
+        """Mass matrix of the links."""
+        return self._by(2)
+
+    def _by(self, which: int) -> Float[Array, "T n n"]:
+        """Derivative by one of q, qd, qdd; each sample depends on its own row only, so n directions are enough."""
+        arm, motion = chain(self.robot, self.ahead), [self.q, self.qd, self.qdd]
+
+        def torque(x):
+            return rigid_torque(arm, *(y.T for y in (*motion[:which], x, *motion[which + 1 :]))).T
+
+        directions = jnp.broadcast_to(jnp.eye(self.robot.n)[:, None, :], (self.robot.n, *self.q.shape))
+        slopes = jax.vmap(lambda v: jax.jvp(torque, (motion[which],), (v,))[1])(directions)
+        return jnp.moveaxis(slopes, 0, -1)

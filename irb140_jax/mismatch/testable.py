@@ -1,0 +1,143 @@
+"""What these recordings could have shown and what not: every effect, at a strength that matters on a lively motion.
+
+Along a slow motion hardly anything is large, so a share of the torque there says nothing: 6 % of it would be a rotor as
+heavy as the arm.  Strengths are therefore those of a lively motion of the same robot within its limits.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from irb140_jax.effects import AbstractEffect, Scales
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.candidates import Library, columns_along, prepared
+from irb140_jax.mismatch.evidence import eliminated
+from irb140_jax.mismatch.explain import Explanation
+from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.excite import Excitation, fourier_motion, within
+from irb140_jax.robot import Robot
+
+REFERENCE_SHARE = 0.06  # an effect of this share of the joint's torque along a lively motion should be seen ...
+VISIBLE = 5.0  # ... with this many standard deviations, or the motion can't test it
+LIVELY = {"duration": 10.0, "speed": 0.6, "seed": 1}  # the reference motion: 60 % of the speed limits
+
+
+class AtSite(Protocol):
+    """An effect at a site: a candidate, or what is kept of one."""
+
+    @property
+    def effect(self) -> AbstractEffect: ...  # noqa: D102
+
+    @property
+    def joints(self) -> tuple[int, ...]: ...  # noqa: D102
+
+
+Site = tuple[str, tuple[int, ...]]
+
+
+class Reference(NamedTuple):
+    """What matters on the lively motion.
+
+    Attributes:
+        amplitudes: Of every column of the library, that is `REFERENCE_SHARE` of a joint's torque; zero for columns that
+            are zero there, too; shape (lib.size,).
+        torque: RMS of the nominal model's torque [N m or N], shape (n,).
+    """
+
+    amplitudes: np.ndarray
+    torque: np.ndarray
+
+
+def reference(lib: Library, scales: Scales, rate: float) -> Reference:
+    """Drive the nominal model along the lively motion.
+
+    Args:
+        lib: The library.
+        scales: Sizes of the recordings, for robots without limits.
+        rate: Of the samples [1/s].
+    """
+    robot = within(lib.robot, scales.low, scales.high)
+    motion = played(fourier_motion(robot, rate=rate, **LIVELY), scales.rest_speed)
+    along = columns_along(lib, prepared(lib.robot, motion))
+    joints, amplitudes = lib.entries
+    # Of the joints it acts on: all of them, for effects that act everywhere.
+    torque, column = np.mean(along.nominal**2, axis=0), np.mean(along.effects**2, axis=0)
+    power, reach = np.zeros(lib.size), np.zeros(lib.size)
+    np.add.at(power, amplitudes, column)
+    np.add.at(reach, amplitudes, torque[joints])
+    amplitudes = np.divide(REFERENCE_SHARE * np.sqrt(reach), np.sqrt(power), out=np.zeros(lib.size), where=power > 0)
+    return Reference(amplitudes, np.sqrt(torque))
+
+
+def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
+    """A motion as if it were recorded, with joints unusable where they rest, and without torque."""
+    usable = np.abs(motion.qd) > rest_speed
+    return Conditioned(
+        motion.name, motion.t, motion.q, motion.qd, motion.qdd, np.zeros_like(motion.q), usable, rest_speed, ()
+    )
+
+
+def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, int]]:
+    """Of every effect at every site: how far it would stand out of the noise, and its candidate.
+
+    Not of those that are named, part of a named one, or were tested against it because they contain it.
+
+    Args:
+        ex: The explanation; inertials and named effects are free.
+        matters: From `reference`.
+
+    Returns:
+        Standard deviations and index of the candidate that stands out most.
+    """
+    H, _ = eliminated(ex.problem.H, ex.problem.columns(ex.chosen))
+    seen: dict[Site, tuple[float, int]] = {}
+    for i, c in enumerate(ex.data.candidates):
+        if c.slug == "inertials" or any(_related(c, m) for m in ex.members):
+            continue
+        scale = ex.data.scale[ex.data.nuisances + c.columns]
+        strength = np.divide(matters.amplitudes[c.columns], scale, out=np.zeros(len(scale)), where=scale > 0)
+        z = stands_out(H, c, c.columns + ex.problem.offset, strength, ex.members)
+        if z >= seen.get((c.slug, c.joints), (-1.0, 0))[0]:
+            seen[c.slug, c.joints] = z, i
+    return seen
+
+
+def stands_out(
+    H: np.ndarray, candidate: AtSite, columns: np.ndarray, strength: np.ndarray, members: Sequence[AtSite]
+) -> float:
+    """Standard deviations by which an effect stands out, in what it has beyond its special case.
+
+    Args:
+        H: Gram matrix with inertials and named effects eliminated.
+        candidate: The effect at a site.
+        columns: Its columns in H.
+        strength: Amplitude of each in prior units.
+        members: The named effects.
+    """
+    effect = candidate.effect
+    own = min(effect.own % len(columns), len(columns) - 1)
+    simple = set(effect.contains)
+    # A named law at the site that is or has the special case is eliminated already.
+    there = any(m.joints == candidate.joints and simple & {m.effect.slug, *m.effect.contains} for m in members)
+    left, _ = eliminated(H, columns[:0] if there or not simple else np.delete(columns, own))
+    return float(strength[own] * np.sqrt(max(left[columns[own], columns[own]], 0.0)))
+
+
+def _related(one: AtSite, member: AtSite) -> bool:
+    """Whether an effect is a named one, a part of it, or contains it."""
+    a, b = one.effect, member.effect
+    return one.joints == member.joints and (a.slug == b.slug or a.slug in b.contains or b.slug in a.contains)
+
+
+def not_testable(robot: Robot, found: set[str], seen: dict[Site, tuple[float, int]]) -> list[dict[str, Any]]:
+    """Effects that this motion could not have shown, with the joints where that is so, as the contract has them."""
+    blind: dict[str, set[int]] = {}
+    for (slug, joints), (z, _) in seen.items():
+        if z < VISIBLE and slug not in found:
+            blind.setdefault(slug, set()).update(joints)
+    return [
+        {"effect": slug, "joints": [robot.joint_names[j] for j in sorted(joints)],
+         "needs": f"Needs {CATALOGUE[slug].needs}."}
+        for slug, joints in sorted(blind.items())
+    ]  # fmt: skip

@@ -1,0 +1,248 @@
+"""What a diagnosis leaves open, kept in a form in which the motion that would decide it can be designed."""
+
+import dataclasses
+import json
+import pathlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from irb140_jax.effects import AbstractEffect, Scales
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.errors import InputError
+from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.explain import Explanation
+from irb140_jax.mismatch.testable import VISIBLE, Reference, Site
+from irb140_jax.recordings.condition import Band
+
+FILE = "undecided.npz"
+UNKNOWN_NOISE = 0.01  # of a joint's torque on a lively motion: what current sensors of arms have
+Sets = tuple[tuple[int, ...], ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """An effect at a site with a shape, of the few that matter to what is open.
+
+    Attributes:
+        slug: The effect.
+        joints: Indices of its joints.
+        shape: Shape parameters.
+        variant: Columns it uses.
+    """
+
+    slug: str
+    joints: tuple[int, ...]
+    shape: tuple[float, ...]
+    variant: tuple[int, ...]
+
+    @property
+    def effect(self) -> AbstractEffect:
+        """The effect itself."""
+        return CATALOGUE[self.slug]
+
+
+@dataclasses.dataclass(frozen=True)
+class Pair:
+    """Two explanations of the same finding that the data can't tell apart.
+
+    Attributes:
+        joints: Of the finding.
+        named, rival: Slugs.
+        probability: Of the rival.
+        rest: Effects that both explanations have beside, as indices of columns.
+        named_sets, rival_sets: The sets of effects of either, one for every shape that may be meant.
+    """
+
+    joints: tuple[int, ...]
+    named: str
+    rival: str
+    probability: float
+    rest: tuple[int, ...]
+    named_sets: Sets
+    rival_sets: Sets
+
+
+@dataclasses.dataclass(frozen=True)
+class Undecided:
+    """What the recordings say of all explanations in question, without the recordings.
+
+    Attributes:
+        columns: The effects in question.
+        chosen: Those of the diagnosis.
+        loose: Links whose inertials are wrong beyond their stated uncertainty.
+        pairs: What can't be told apart.
+        hidden: Effects that the motion could not have shown.
+        gram: Whitened Gram matrix over [inertials | loose links | amplitudes | y] in prior units.
+        scale: Prior standard deviation of every amplitude.
+        reference: Strength of every amplitude at which an effect should be seen, in prior units.
+        uncertainty: Relative standard deviation of the inertials.
+        ar, level: Noise of each joint: whitening filter, shape (n, lags + 1), and innovation [N m or N], shape (n,).
+        band: Of the comparison.
+        scales: Sizes of the recordings.
+    """
+
+    columns: tuple[Column, ...]
+    chosen: tuple[int, ...]
+    loose: tuple[int, ...]
+    pairs: tuple[Pair, ...]
+    hidden: tuple[int, ...]
+    gram: np.ndarray
+    scale: np.ndarray
+    reference: np.ndarray
+    uncertainty: float
+    ar: np.ndarray
+    level: np.ndarray
+    band: Band
+    scales: Scales
+
+
+def undecided(
+    ex: Explanation, findings: Sequence[dict[str, Any]], seen: dict[Site, tuple[float, int]], matters: Reference,
+    band: Band, scales: Scales, uncertainty: float,
+) -> Undecided:  # fmt: skip
+    """What is open after a diagnosis.
+
+    Args:
+        ex: The explanation.
+        findings: Of the diagnosis.
+        seen: How well every other effect could be seen, from `visibility`.
+        matters: Strengths at which that is judged, from `testable.reference`.
+        band: Of the comparison.
+        scales: Sizes of the recordings.
+        uncertainty: Relative standard deviation of the inertials.
+    """
+    names = ex.lib.robot.joint_names
+    table = _Table(ex)
+    physics = tuple(c for c in ex.chosen if ex.data.candidates[c].slug != "inertials")
+    loose = tuple(c for c in ex.chosen if c not in physics)
+    pairs = []
+    for f in findings:
+        site = tuple(names.index(j) for j in f["joints"])
+        at = next(c for c in physics if _key(ex.data.candidates[c]) == (f["effect"], site))
+        for a in f["alternatives"]:
+            rival = _rival(ex, at, a["effect"], loose)
+            if rival:
+                pairs.append((site, f["effect"], a["effect"], a["probability"], at, rival))
+    beside = lambda at: table.of(c for c in physics if c != at)  # noqa: E731
+    made = tuple(
+        Pair(site, named, slug, p, beside(at), table.sets(ex, (at,)), table.sets(ex, rival))
+        for site, named, slug, p, at, rival in pairs
+    )
+    chosen = table.of(physics)
+    hidden = table.of(i for z, i in seen.values() if z < VISIBLE)
+    table.of(i for _, i in seen.values())
+    links = tuple(ex.data.candidates[c].joints[0] for c in loose)
+    gram, scale, strength = table.gram(ex, loose, matters.amplitudes)
+    # A joint that never moved told nothing of its noise.
+    still = ex.grams.rows.sum(axis=0) == 0
+    level = np.where(still, UNKNOWN_NOISE * matters.torque, np.median(ex.noise.level, axis=0))
+    return Undecided(
+        tuple(table.columns), chosen, links, made, hidden, gram, scale, strength, uncertainty, ex.noise.ar, level,
+        band, scales,
+    )  # fmt: skip
+
+
+class _Table:
+    """Candidates of the whole library, numbered anew as they are asked for."""
+
+    def __init__(self, ex: Explanation):
+        self._candidates, self._numbers = ex.data.candidates, {}
+
+    @property
+    def columns(self) -> list[Column]:
+        """The effects, in their new order."""
+        picked = (self._candidates[i] for i in self._numbers)
+        return [Column(c.slug, c.joints, tuple(map(float, c.shape)), c.variant) for c in picked]
+
+    def of(self, indices) -> tuple[int, ...]:
+        """New numbers of some candidates."""
+        return tuple(self._numbers.setdefault(int(i), len(self._numbers)) for i in indices)
+
+    def sets(self, ex: Explanation, members: tuple[int, ...]) -> Sets:
+        """The set with every shape that its first member may have."""
+        first, *others = members
+        c = ex.data.candidates[first]
+        alike = [i for i, o in enumerate(ex.data.candidates) if _key(o) == _key(c) and o.variant == c.variant]
+        return tuple(self.of((i, *others)) for i in alike)
+
+    def gram(
+        self, ex: Explanation, loose: tuple[int, ...], reference: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Gram matrix of the recordings over the new columns, their prior scales, and reference strengths in these."""
+        nuisances = ex.data.nuisances
+        parts = [ex.data.candidates[i].columns for i in self._numbers]
+        amplitudes = np.concatenate(parts) if parts else np.zeros(0, dtype=int)
+        H = ex.grams.total()
+        index = np.concatenate(
+            [np.arange(nuisances), ex.problem.columns(loose), nuisances + amplitudes, [H.shape[0] - 1]]
+        )
+        scale = ex.data.scale[nuisances + amplitudes]
+        strength = np.divide(reference[amplitudes], scale, out=np.zeros(len(scale)), where=scale > 0)
+        return H[np.ix_(index, index)], scale, strength
+
+
+def _key(c: Candidate) -> tuple[str, tuple[int, ...]]:
+    return c.slug, c.joints
+
+
+def _rival(ex: Explanation, at: int, slug: str, loose: tuple[int, ...]) -> tuple[int, ...] | None:
+    """The likeliest set with another effect in a finding's place, a special case of the finding beside it or not."""
+    c = ex.data.candidates[at]
+    rest = tuple(x for x in ex.chosen if x != at)
+    wider = CATALOGUE[slug].contains
+    special = [
+        i for i, o in enumerate(ex.data.candidates)
+        if o.slug in c.effect.contains and o.joints == c.joints and o.slug not in wider
+    ]  # fmt: skip
+    best, found = -np.inf, None
+    for beside in ((), *((s,) for s in special)):
+        scores = ex.problem.scores((*rest, *beside), c.joints) + ex.problem.odds(rest, beside)
+        for i in np.flatnonzero(np.isfinite(scores)):
+            if ex.data.candidates[i].slug == slug and i not in rest and scores[i] > best:
+                best, found = float(scores[i]), (int(i), *beside)
+    return found
+
+
+def save_undecided(open_: Undecided, folder: pathlib.Path) -> None:
+    """Write into an existing folder."""
+    meta = {
+        "schema": 1, "columns": [dataclasses.asdict(c) for c in open_.columns], "chosen": open_.chosen,
+        "loose": open_.loose, "pairs": [dataclasses.asdict(p) for p in open_.pairs], "hidden": open_.hidden,
+        "uncertainty": open_.uncertainty, "band": dataclasses.asdict(open_.band), "duration": open_.scales.duration,
+    }  # fmt: skip
+    sizes = {k: v for k, v in open_.scales._asdict().items() if k != "duration"}
+    np.savez_compressed(
+        folder / FILE, meta=np.array(json.dumps(meta)), gram=open_.gram, scale=open_.scale, ar=open_.ar,
+        reference=open_.reference, level=open_.level, **sizes,
+    )  # fmt: skip
+
+
+def load_undecided(folder: str | pathlib.Path) -> Undecided:
+    """Read what a diagnosis left open.
+
+    Raises:
+        InputError: The folder holds no readable diagnosis.
+    """
+    path = pathlib.Path(folder) / FILE
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+        meta = json.loads(str(arrays.pop("meta")))
+        sizes = {k: arrays.pop(k) for k in Scales._fields if k != "duration"}
+        return Undecided(
+            columns=tuple(Column(**{k: _tuples(v) for k, v in c.items()}) for c in meta["columns"]),
+            pairs=tuple(Pair(**{k: _tuples(v) for k, v in p.items()}) for p in meta["pairs"]),
+            **{k: _tuples(meta[k]) for k in ("chosen", "loose", "hidden")}, uncertainty=meta["uncertainty"],
+            band=Band(**meta["band"]), scales=Scales(duration=meta["duration"], **sizes), **arrays,
+        )  # fmt: skip
+    except FileNotFoundError:
+        raise InputError(f"{folder}: holds no {FILE}; name a folder that `irb140 diagnose` has written") from None
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise InputError(f"{path}: can't be read ({error}); diagnose again") from error
+
+
+def _tuples(x: Any) -> Any:
+    """Lists of JSON as the tuples that they were."""
+    return tuple(map(_tuples, x)) if isinstance(x, list) else x

@@ -1,0 +1,72 @@
+"""A proposed motion in plain sentences: what it is made of, what it decides, and what not even it can."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch import Proposal, Undecided
+from irb140_jax.mismatch.testable import VISIBLE
+from irb140_jax.mismatch.undecided import Pair
+from irb140_jax.robot import Robot
+
+SEPARATED = np.log(20.0)  # log odds at which one of two explanations has won
+
+
+def proposal_sentences(robot: Robot, open_: Undecided, proposal: Proposal) -> list[str]:
+    """What to tell the person who is going to play the motion.
+
+    Args:
+        robot: The robot of the diagnosis.
+        open_: What it left open.
+        proposal: The motion.
+    """
+    pieces = _listed([p.said(robot.joint_names) for p in proposal.pieces])
+    lines = [f"{proposal.motion.t[-1]:.0f} s from rest to rest: {pieces}."]
+    for pair, now, odds in zip(open_.pairs, proposal.odds_now, proposal.odds, strict=True):
+        lines.append(_pair(robot, pair, now, odds))
+    lines += _hidden(robot, open_, proposal)
+    if not open_.pairs and not open_.hidden:
+        lines.append("The diagnosis left nothing open: along this motion every effect would show.")
+    unlimited = [n for n, v in zip(robot.joint_names, np.asarray(robot.velocity_limit), strict=True) if np.isinf(v)]
+    if unlimited:
+        lines.append(
+            f"The model gives no speed limit for {_listed(unlimited)}: the motion stays below twice the speed recorded."
+        )
+    return lines
+
+
+def _pair(robot: Robot, pair: Pair, now: float, odds: float) -> str:
+    where = _listed([robot.joint_names[j] for j in pair.joints])
+    one, other = CATALOGUE[pair.named], CATALOGUE[pair.rival]
+    said = (
+        f"On {where}, {one.title} or {other.title}: the recordings give log odds of {now:.1f} at best; "
+        f"with this motion beside them {odds:.1f} at least are to be expected for the true one"
+    )
+    if odds > SEPARATED:
+        return f"{said}, which separates them."
+    motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
+    return f"{said}: no motion that was tried separates them{f'; what may is {motion}' if motion else ''}."
+
+
+def _hidden(robot: Robot, open_: Undecided, proposal: Proposal) -> Iterator[str]:
+    """Effects that the recordings could not have shown: those that this motion shows, then the others."""
+    shown: dict[bool, dict[str, list[str]]] = {True: {}, False: {}}
+    for c, z in zip(open_.hidden, proposal.seen, strict=True):
+        column = open_.columns[c]
+        joints = "all joints" if column.effect.everywhere and len(column.joints) == robot.n else _listed(
+            [robot.joint_names[j] for j in column.joints])
+        shown[z >= VISIBLE].setdefault(column.effect.title, []).append(joints)
+    if shown[True]:
+        yield f"What the recordings could not have shown and this motion does: {_titles(shown[True])}."
+    if shown[False]:
+        yield f"Not even this motion shows: {_titles(shown[False])}."
+
+
+def _titles(effects: dict[str, list[str]]) -> str:
+    return "; ".join(f"{title} on {_listed(list(dict.fromkeys(joints)))}" for title, joints in effects.items())
+
+
+def _listed(words: list[str]) -> str:
+    words = list(dict.fromkeys(words))
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

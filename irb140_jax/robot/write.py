@@ -1,0 +1,84 @@
+"""A robot as MJCF: what `load_robot` reads, and MuJoCo simulates."""
+
+import numpy as np
+
+from irb140_jax.robot.robot import Robot
+
+
+def robot_mjcf(robot: Robot, option: str = "", flag: str = "") -> str:
+    """MJCF of the chain: inertials, rotors, friction, springs, limits, motors with their gears, and the tool.
+
+    Shapes to draw or to touch are no part of a `Robot`, so there are none.
+
+    Args:
+        robot: Arm with n joints and concrete numbers; every link with a possible inertia.
+        option: Attributes of <option> beside gravity, as XML.
+        flag: Attributes of <option><flag>, as XML.
+
+    Returns:
+        The XML.  Loaded again, every number is the same to rounding.
+    """
+    inner = f'<site name="tool" {_placed(robot.tool_rotation, robot.tool_position)}/>'
+    for i in reversed(range(robot.n)):
+        inner = (
+            f'\n<body name="link{i + 1}" {_placed(robot.rotation[i], robot.position[i])}>\n'
+            f"{_inertial(robot, i)}\n{_joint(robot, i)}{inner}</body>"
+        )
+    base = f'<body name="base" {_placed(robot.base_rotation, robot.base_position)}>{inner}\n</body>'
+    gravity = _text(np.asarray(robot.base_rotation) @ np.asarray(robot.gravity))
+    motors = "\n".join(_motor(robot, i) for i in range(robot.n))
+    return (
+        f'<mujoco model="{_escaped(robot.name)}">\n'
+        '<compiler angle="radian" autolimits="true" boundmass="1e-12" boundinertia="1e-15"/>\n'
+        f'<option gravity="{gravity}" {option}><flag {flag}/></option>\n{_speeds(robot)}'
+        f"<worldbody>\n{base}\n</worldbody>\n<actuator>\n{motors}\n</actuator>\n</mujoco>\n"
+    )
+
+
+def _joint(robot: Robot, i: int) -> str:
+    numbers = {
+        "ref": robot.reference, "armature": robot.armature, "damping": robot.damping,
+        "frictionloss": robot.frictionloss, "stiffness": robot.stiffness, "springref": robot.springref,
+    }  # fmt: skip
+    lower, upper = float(robot.lower[i]), float(robot.upper[i])
+    limits = f' range="{_text([lower, upper])}"' if np.isfinite(lower) and np.isfinite(upper) else ""
+    written = " ".join(f'{name}="{_text(values[i])}"' for name, values in numbers.items())
+    kind = "slide" if robot.is_slide[i] else "hinge"
+    name = _escaped(robot.joint_names[i])
+    return f'<joint name="{name}" type="{kind}" axis="{_text(robot.axis[i])}" {written}{limits}/>'
+
+
+def _inertial(robot: Robot, i: int) -> str:
+    inertia = np.asarray(robot.inertia[i])
+    full = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return f'<inertial mass="{_text(robot.mass[i])}" pos="{_text(robot.com[i])}" fullinertia="{_text(full)}"/>'
+
+
+def _motor(robot: Robot, i: int) -> str:
+    """A torque source; its force is limited on its own side of the gear."""
+    gear, effort = float(robot.gear[i]), float(robot.effort_limit[i])
+    limit = f' forcerange="{_text([-effort / abs(gear), effort / abs(gear)])}"' if np.isfinite(effort) else ""
+    name = _escaped(robot.joint_names[i])
+    return f'<motor name="{name}" joint="{name}" gear="{_text(gear)}"{limit}/>'
+
+
+def _speeds(robot: Robot) -> str:
+    """Speed limits where there are any; MJCF has no attribute for them, `load_robot` reads this."""
+    limit = np.minimum(np.asarray(robot.velocity_limit), 1e9)  # MJCF has no infinity
+    if np.all(limit >= 1e9):
+        return ""
+    return f'<custom><numeric name="velocity_limit" size="{robot.n}" data="{_text(limit)}"/></custom>\n'
+
+
+def _placed(rotation, position) -> str:
+    """Attributes of a pose; axes rather than a quaternion, since those are what the robot holds."""
+    R = np.asarray(rotation)
+    return f'pos="{_text(position)}" xyaxes="{_text(np.concatenate([R[:, 0], R[:, 1]]))}"'
+
+
+def _text(x) -> str:
+    return " ".join(repr(float(value)) for value in np.ravel(np.asarray(x)))
+
+
+def _escaped(name: str) -> str:
+    return name.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")

@@ -1,0 +1,253 @@
+"""The corrected model taken away: in JAX what `predict` gives, and in MuJoCo as much of it as MJCF can hold."""
+
+import functools
+
+import equinox as eqx
+import helpers_recordings
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+import irb140_jax as irb
+from irb140_jax.control import Reference, SlidingMode
+from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.errors import InputError
+from irb140_jax.mismatch import corrected_robot, predict, prediction_times
+from irb140_jax.mismatch.consistent import consistent, pseudo_inertia
+from irb140_jax.mismatch.model import CorrectedModel, Named, from_json, to_json, torques_along
+from irb140_jax.mismatch.native import NOTES, XML, native_robot, save_native
+from irb140_jax.recordings import read_recording
+from irb140_jax.recordings.conceal import random_robot
+from irb140_jax.recordings.concealed.plant import arm_spec, rigid_torque
+from irb140_jax.recordings.condition import Band, Conditioned
+from irb140_jax.recordings.excite import fourier_motion
+from irb140_jax.robot import load_robot, robot_from_model, robot_mjcf
+from irb140_jax.simulate import play
+
+REST = 1e-3  # [rad/s or m/s] over which sign(qd) is rounded off
+VALUES = {
+    "coulomb": 0.4, "coulomb_pos": 0.3, "coulomb_neg": 0.5, "viscous": 0.5, "static": 0.7, "stribeck_velocity": 0.1,
+    "coefficient": 0.3, "exponent": 0.7, "load_coefficient": 0.05, "viscous_cold": 0.4, "relative_drop": 0.3,
+    "depth": 0.5, "centre": 0.1, "width": 0.2, "inertia": 0.2, "gain": 1.05, "offset": 0.02, "amplitude": 0.3,
+    "cycles_per_rad": 2.0, "delay": 0.003, "rest": 0.2, "tilt": 0.02, "mass": 0.4, "gap": 0.001,
+}  # fmt: skip
+OWN = {
+    "thermal_friction_drift": {"time_constant": 3.0}, "actuator_lag": {"time_constant": 0.01},
+    "presliding_hysteresis": {"stiffness": 40.0}, "gravity_spring": {"stiffness": 2.0},
+    "joint_elasticity": {"stiffness": 5000.0}, "contact": {"stiffness": 500.0},
+}  # fmt: skip
+AT_ONCE = [slug for slug in CATALOGUE if slug in OWN or {p.name for p in CATALOGUE[slug].parameters} <= set(VALUES)]
+
+
+@functools.cache
+def arm():
+    return robot_from_model(arm_spec(random_robot(4, 2, slides=0.0)).compile(), "two hinges")
+
+
+@functools.cache
+def motion():
+    """5 s at 200 Hz, with no joint slower than the rounding of sign(qd) reaches."""
+    return fourier_motion(arm(), 5.0, 200.0, seed=1)
+
+
+def named(slug):
+    effect = CATALOGUE[slug]
+    w, shape = effect.amplitudes(VALUES | OWN.get(slug, {}))
+    return Named(effect, tuple(map(int, effect.sites(arm())[0])), tuple(range(len(w))), w, shape)
+
+
+def model(*slugs, rest=REST, phi=1.03):
+    nominal = np.asarray(arm().phi)
+    effects = tuple(named(slug) for slug in slugs)
+    band = Band(torque=10.0, position=16.0, rate=200.0, step=4)
+    return CorrectedModel(arm(), 1.01 * nominal, phi * nominal, effects, band, np.full(arm().n, rest))
+
+
+def torque_along(robot, m):
+    return np.asarray(robot.inverse_dynamics_along(*(jnp.asarray(x) for x in (m.t, m.q, m.qd, m.qdd))))
+
+
+def as_conditioned(m, rest=REST):
+    usable = np.ones_like(m.q, dtype=bool)
+    return Conditioned("made", m.t, m.q, m.qd, m.qdd, 0.0 * m.q, usable, np.full(m.q.shape[1], rest), ())
+
+
+def test_the_jax_model_gives_the_torque_that_predict_gives_with_every_effect_at_once():
+    everything, m = model(*AT_ONCE), motion()
+    assert len(AT_ONCE) > 15
+    fitted = torques_along(everything, as_conditioned(m)).corrected
+    tau = torque_along(corrected_robot(everything), m)
+    # The fit differentiates the rigid body by differences of 1e-5, JAX exactly.
+    np.testing.assert_allclose(tau, fitted, rtol=0, atol=1e-6 * np.abs(fitted).max())
+
+
+INSTANT = (
+    "viscous_friction", "load_dependent_friction", "thermal_friction_drift", "rotor_inertia", "torque_gain", "payload",
+)  # fmt: skip
+
+
+@functools.cache
+def instants():
+    """A model whose effects have a torque at one instant, of time, load and acceleration too; rows of the motion."""
+    robot, m = corrected_robot(model(*INSTANT)), motion()
+    return robot, [jnp.asarray(x[::40]) for x in (m.q, m.qd, m.qdd, m.t)], torque_along(robot, m)[::40]
+
+
+def test_the_torque_at_an_instant_is_that_of_the_motion_there():
+    robot, rows, along = instants()
+    tau = jax.jit(jax.vmap(robot.inverse_dynamics))(*rows)
+    np.testing.assert_allclose(tau, along, rtol=1e-10, atol=1e-10)
+
+
+def test_forward_dynamics_is_the_inverse_of_inverse_dynamics():
+    robot, (q, qd, qdd, t), along = instants()
+    again = jax.jit(jax.vmap(robot.forward_dynamics))(q, qd, along, t)
+    np.testing.assert_allclose(again, qdd, rtol=1e-9, atol=1e-9)  # Newton's steps end at rounding
+
+
+def test_the_torque_can_be_differentiated_by_an_effects_parameter():
+    robot, (q, qd, qdd, _), _ = instants()
+    only = robot.without(*INSTANT[1:])
+    slope = eqx.filter_grad(lambda r: r.inverse_dynamics(q[3], qd[3], qdd[3])[0])(only)
+    np.testing.assert_allclose(slope.effects[0].amplitudes, qd[3, :1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("slug", [slug for slug in AT_ONCE if CATALOGUE[slug].history])
+def test_a_torque_that_depends_on_what_was_before_is_refused_at_an_instant(slug):
+    robot, state = corrected_robot(model(slug)), jnp.zeros(arm().n)
+    with pytest.raises(InputError, match=slug):
+        robot.inverse_dynamics(state, state, state)
+
+
+@pytest.mark.parametrize("slug", [s for s in AT_ONCE if CATALOGUE[s].history and not CATALOGUE[s].steps])
+def test_what_cannot_be_simulated_forward_is_refused_by_its_name(slug):
+    with pytest.raises(InputError, match=slug):
+        corrected_robot(model(slug)).at_rest(jnp.zeros(arm().n))
+
+
+def simulated(robot, seconds=1.0, dt=5e-4):
+    """The corrected arm under sliding mode control of the nominal one, along a slow motion."""
+    m = fourier_motion(arm(), seconds, 1.0 / dt, seed=3, speed=0.3)
+    reference = Reference(*(jnp.asarray(x) for x in (m.t, m.q, m.qd, m.qdd)))
+    slope, gain, layer, damping = (jnp.full(arm().n, x) for x in (10.0, 1.0, 0.5, 10.0))
+    return play(robot, SlidingMode(arm(), slope, gain, layer, damping), reference)
+
+
+def test_a_simulation_with_bristles_has_the_torque_of_its_own_motion():
+    robot = corrected_robot(model("presliding_hysteresis", "viscous_friction", "load_dependent_friction"))
+    run = simulated(robot)
+    again = torque_along(robot, run)
+    assert np.abs(run.qd).max() > 0.05
+    np.testing.assert_allclose(again, run.tau, rtol=0, atol=1e-8 * np.abs(run.tau).max())
+
+
+def test_a_drive_that_lags_gives_what_was_asked_for_one_time_constant_ago():
+    robot = corrected_robot(model("actuator_lag"))
+    run = simulated(robot)
+    real = torque_along(robot.without("actuator_lag"), run)
+    tau = np.asarray(run.tau)
+    settled = slice(200, None)
+    asked = np.interp(run.t - 0.01, run.t, tau[:, 0])
+    off = np.sqrt(np.mean((real[settled, 0] - asked[settled]) ** 2))
+    unlagged = np.sqrt(np.mean((real[settled, 0] - tau[settled, 0]) ** 2))
+    assert 0.0 < off < 0.4 * unlagged  # a lag is a delay but for the curvature of the torque
+
+
+WHOLE = [slug for slug in AT_ONCE if CATALOGUE[slug].not_in_mjcf == ""]
+SECOND_ORDER = ("encoder_offset", "gravity_tilt")  # the fit has them to first order at the nominal inertials
+
+
+def mujoco_torque(native, m):
+    """What the motors of the reloaded file would be asked for, by MuJoCo's inverse dynamics."""
+    compiled = mujoco.MjModel.from_xml_string(robot_mjcf(native))
+    tau = rigid_torque(compiled, m.q, m.qd, m.qdd) + compiled.dof_frictionloss * np.sign(m.qd)
+    return tau / compiled.actuator_gear[:, 0] * np.asarray(arm().gear)
+
+
+def test_mujoco_reproduces_the_prediction_where_everything_can_be_expressed():
+    exact, m = [slug for slug in WHOLE if slug not in SECOND_ORDER], motion()
+    assert {"coulomb_friction", "payload", "torque_gain", "gravity_spring", "torque_offset"} <= set(exact)
+    whole = model(*exact, rest=1e-9)
+    fitted = torques_along(whole, as_conditioned(m, 1e-9)).corrected
+    # A constant torque is a spring soft to 1e-7; rounding of sign(qd) is off.
+    np.testing.assert_allclose(mujoco_torque(native_robot(whole), m), fitted, atol=1e-6 * np.abs(fitted).max())
+
+
+@pytest.mark.parametrize("slug", SECOND_ORDER)
+def test_mujoco_reproduces_wrong_zeros_and_leaning_bases_to_second_order(slug):
+    one, m = model(slug, phi=1.0), motion()
+    fitted, plain = (torques_along(x, as_conditioned(m)).corrected for x in (one, model(phi=1.0)))
+    off = mujoco_torque(native_robot(one), m) - fitted
+    assert np.abs(off).max() < 0.03 * np.abs(fitted - plain).max()  # offset 0.02 rad, tilt 0.02 rad
+
+
+@pytest.mark.parametrize("slug", [s for s in AT_ONCE if CATALOGUE[s].mjcf and CATALOGUE[s].not_in_mjcf])
+def test_the_part_that_mjcf_can_hold_brings_it_nearer(slug):
+    one, m = model(slug, phi=1.0), motion()
+    fitted = torques_along(one, as_conditioned(m)).corrected
+    rms = lambda x: float(np.sqrt(np.mean(x**2)))  # noqa: E731
+    with_part, without = (rms(mujoco_torque(native_robot(x), m) - fitted) for x in (one, model(phi=1.0)))
+    assert with_part < 0.9 * without
+
+
+def test_the_written_file_is_read_again_as_the_same_robot_and_says_what_it_lacks(tmp_path):
+    some = model("coulomb_friction", "stribeck_friction", "time_delay")
+    save_native(some, tmp_path)
+    again, native = load_robot(tmp_path / XML), native_robot(some)
+    for a, b in zip(jax.tree.leaves(again), jax.tree.leaves(native), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9)
+    page = (tmp_path / NOTES).read_text()
+    assert page.index("Coulomb friction") < page.index("In it in part") < page.index("Stribeck friction")
+    assert page.index("## Not in it") < page.index(CATALOGUE["time_delay"].title)
+
+
+def test_every_effect_says_how_much_of_it_mjcf_can_express():
+    for effect in CATALOGUE.values():
+        assert effect.mjcf or effect.not_in_mjcf, effect.slug
+        changed = type(effect).in_model is not AbstractEffect.in_model
+        assert changed == bool(effect.mjcf), effect.slug
+        assert not effect.not_in_mjcf.endswith("."), effect.slug
+
+
+def test_possible_inertials_stay_as_they_are():
+    phi = np.asarray(irb.robot.irb140().phi)
+    np.testing.assert_array_equal(consistent(1.04 * phi, phi), 1.04 * phi)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_impossible_inertials_become_those_of_a_body_that_mujoco_accepts(seed):
+    phi = np.asarray(arm().phi)
+    wild = phi * (1.0 + 2.0 * np.random.default_rng(seed).normal(size=phi.shape))
+    assert min(np.linalg.eigvalsh(pseudo_inertia(p)).min() for p in wild) < 0.0
+    mended = consistent(wild, phi)
+    assert min(np.linalg.eigvalsh(pseudo_inertia(p)).min() for p in mended) > 0.0
+    mujoco.MjModel.from_xml_string(robot_mjcf(irb.robot.with_phi(arm(), jnp.asarray(mended))))
+
+
+def test_the_model_survives_its_way_through_json():
+    some, m = model("coulomb_friction", "torque_gain"), motion()
+    again = from_json(to_json(some))
+    np.testing.assert_array_equal(torque_along(corrected_robot(again), m), torque_along(corrected_robot(some), m))
+
+
+def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"model\.json"):
+        irb.load_corrected(tmp_path)
+
+
+def test_a_prediction_has_a_row_for_every_row_of_the_file_also_for_repeated_ones(tmp_path):
+    frame = helpers_recordings.frame(helpers_recordings.recording())
+    repeated = frame.loc[np.sort(np.r_[np.arange(len(frame)), 700, 1300])]
+    paths = [tmp_path / "once.csv", tmp_path / "twice.csv"]
+    for table, path in zip((frame, repeated), paths, strict=True):
+        table.to_csv(path, index=False)
+    robot = helpers_recordings.robot()
+    once, twice = (read_recording(path, robot) for path in paths)
+    phi = np.asarray(robot.phi)
+    plain = CorrectedModel(robot, phi, phi, (), Band(10.0, 16.0, 200.0, 4), np.full(robot.n, REST))
+    assert len(prediction_times(twice)) == len(repeated) == len(frame) + 2
+    expected = predict(plain, once)["corrected"][np.searchsorted(once.t, prediction_times(twice))]
+    np.testing.assert_allclose(predict(plain, twice)["corrected"], expected, rtol=1e-9, atol=1e-9)
