@@ -111,7 +111,7 @@ class AbstractEffect(abc.ABC):
         not_in_mjcf: What of it MJCF can't express and why, one sentence without its full stop; "" where nothing is.
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
         scouts: Its grid of shapes is looked for in the residual (see `scout`).
-        own: The column that makes it what it is; the others, if any, belong to a special case or refine it.
+        own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
         steps: Whether it can be simulated forward in time all the same (see `memory` and `step`).
     """
@@ -133,7 +133,7 @@ class AbstractEffect(abc.ABC):
     not_in_mjcf: ClassVar[str] = "MJCF has no such torque"
     everywhere: ClassVar[bool] = False
     scouts: ClassVar[bool] = False
-    own: ClassVar[int] = -1
+    own: ClassVar[tuple[int, ...]] = (-1,)
     history: ClassVar[str | None] = None
     steps: ClassVar[bool] = False
 
@@ -192,6 +192,11 @@ class AbstractEffect(abc.ABC):
         """Largest admissible amplitude of each column; beyond it another cause is to be looked for."""
         del robot, joints
         return np.full(max(max(v) for v in self.variants) + 1, np.inf)
+
+    def likely(self, robot: Robot) -> np.ndarray:
+        """Proportion in which its own columns act, shape (len(own),)."""
+        del robot
+        return np.ones(len(self.own))
 
     def memory(self, q: Float[Array, " m"], tau: Float[Array, " m"]) -> Float[Array, " s"]:
         """What it remembers after standing still at q, positions of the site, under the torque tau."""

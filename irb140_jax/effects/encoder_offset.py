@@ -23,7 +23,7 @@ class EncoderOffset(AbstractEffect):
     }
     needs = "postures in which the slope of gravity over this joint changes sign; or its zero mark"
     everywhere = True
-    mjcf = "joint ref"
+    mjcf = "the joint's ref"
     not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):

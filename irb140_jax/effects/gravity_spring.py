@@ -24,7 +24,7 @@ class GravitySpring(AbstractEffect):
     needs = "the whole range of the joint, in several postures of the others"
     mjcf = "joint stiffness and springref"
     not_in_mjcf = ""
-    own = 0
+    own = (0,)
 
     def columns(self, motion, joints, shape):
         q = of_site(motion.q, joints)

@@ -23,7 +23,7 @@ class GravityTilt(AbstractEffect):
     }
     needs = "postures whose gravity torques don't all scale together, with the first joint swept"
     everywhere = True
-    mjcf = "option gravity"
+    mjcf = "the gravity of the option element"
     not_in_mjcf = ""
 
     def sites(self, robot):

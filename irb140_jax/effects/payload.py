@@ -24,7 +24,7 @@ class Payload(AbstractEffect):
     mjcf = "the last link's inertial"
     everywhere = True
     not_in_mjcf = ""
-    own = 0
+    own = tuple(range(10))
 
     def sites(self, robot):
         return np.arange(robot.n)[None, :]
@@ -42,6 +42,9 @@ class Payload(AbstractEffect):
 
     def lowest(self, robot, joints):
         return np.concatenate([[0.0], np.full(9, -np.inf)])
+
+    def likely(self, robot):
+        return self.amplitudes({"mass": 1.0, **dict(zip("xyz", np.asarray(robot.tool_position), strict=True))})[0]
 
     def in_model(self, robot, joints, w, shape):
         return with_phi(robot, robot.phi.at[-1].add(jnp.asarray(w)))

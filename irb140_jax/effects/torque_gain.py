@@ -23,7 +23,7 @@ class TorqueGain(AbstractEffect):
         "load_dependent_friction": "the same loads while standing still",
     }
     needs = "large gravity torque on this joint that other joints' torques confirm, or a known payload"
-    mjcf = "actuator gear"
+    mjcf = "the gear of the actuator"
     not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):

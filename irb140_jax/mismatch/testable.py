@@ -48,6 +48,12 @@ class Reference(NamedTuple):
     amplitudes: np.ndarray
     torque: np.ndarray
 
+    def in_prior_units(self, columns: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """Amplitudes of some columns over their prior scale; zero for what these recordings hardly excite at all."""
+        amplitudes = self.amplitudes[columns]
+        excited = scale > 1e-9 * np.abs(amplitudes)
+        return np.divide(amplitudes, scale, out=np.zeros(len(scale)), where=excited)
+
 
 def reference(lib: Library, scales: Scales, rate: float) -> Reference:
     """Drive the nominal model along the lively motion.
@@ -60,14 +66,18 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
     robot = within(lib.robot, scales.low, scales.high)
     motion = played(fourier_motion(robot, rate=rate, **LIVELY), scales.rest_speed)
     along = columns_along(lib, prepared(lib.robot, motion))
-    joints, amplitudes = lib.entries
-    # Of the joints it acts on: all of them, for effects that act everywhere.
-    torque, column = np.mean(along.nominal**2, axis=0), np.mean(along.effects**2, axis=0)
-    power, reach = np.zeros(lib.size), np.zeros(lib.size)
-    np.add.at(power, amplitudes, column)
-    np.add.at(reach, amplitudes, torque[joints])
-    amplitudes = np.divide(REFERENCE_SHARE * np.sqrt(reach), np.sqrt(power), out=np.zeros(lib.size), where=power > 0)
-    return Reference(amplitudes, np.sqrt(torque))
+    torque, amplitudes = np.sqrt(np.mean(along.nominal**2, axis=0)), np.zeros(lib.size)
+    for effect, sites, shapes, first in lib.blocks:
+        width = max(max(v) for v in effect.variants) + 1
+        own, likely = np.arange(width)[list(effect.own)], effect.likely(lib.robot)
+        for k in range(len(sites) * shapes.shape[1]):
+            columns = first + k * width + own
+            power = np.mean(lib.torque(along.effects, columns, likely) ** 2, axis=0)
+            # Of the joints it acts on: all of them, for effects that act everywhere.
+            joints = slice(None) if effect.everywhere else sites[k // shapes.shape[1]]
+            if power.any():
+                amplitudes[columns] = likely * REFERENCE_SHARE * np.linalg.norm(torque[joints]) / np.sqrt(power.sum())
+    return Reference(amplitudes, torque)
 
 
 def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
@@ -96,7 +106,7 @@ def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, i
         if c.slug == "inertials" or any(_related(c, m) for m in ex.members):
             continue
         scale = ex.data.scale[ex.data.nuisances + c.columns]
-        strength = np.divide(matters.amplitudes[c.columns], scale, out=np.zeros(len(scale)), where=scale > 0)
+        strength = matters.in_prior_units(c.columns, scale)
         z = stands_out(H, c, c.columns + ex.problem.offset, strength, ex.members)
         if z >= seen.get((c.slug, c.joints), (-1.0, 0))[0]:
             seen[c.slug, c.joints] = z, i
@@ -116,12 +126,13 @@ def stands_out(
         members: The named effects.
     """
     effect = candidate.effect
-    own = min(effect.own % len(columns), len(columns) - 1)
+    own = np.arange(len(columns))[list(effect.own)]
     simple = set(effect.contains)
     # A named law at the site that is or has the special case is eliminated already.
     there = any(m.joints == candidate.joints and simple & {m.effect.slug, *m.effect.contains} for m in members)
     left, _ = eliminated(H, columns[:0] if there or not simple else np.delete(columns, own))
-    return float(strength[own] * np.sqrt(max(left[columns[own], columns[own]], 0.0)))
+    size = strength[own] @ left[np.ix_(columns[own], columns[own])] @ strength[own]
+    return float(np.sqrt(max(size, 0.0)))
 
 
 def _related(one: AtSite, member: AtSite) -> bool:

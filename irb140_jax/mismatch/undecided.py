@@ -11,9 +11,10 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
+from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.explain import Explanation
-from irb140_jax.mismatch.testable import VISIBLE, Reference, Site
+from irb140_jax.mismatch.testable import REFERENCE_SHARE, VISIBLE, Reference, Site
 from irb140_jax.recordings.condition import Band
 
 FILE = "undecided.npz"
@@ -134,7 +135,7 @@ def undecided(
     hidden = table.of(i for z, i in seen.values() if z < VISIBLE)
     table.of(i for _, i in seen.values())
     links = tuple(ex.data.candidates[c].joints[0] for c in loose)
-    gram, scale, strength = table.gram(ex, loose, matters.amplitudes)
+    gram, scale, strength = table.gram(ex, loose, matters)
     # A joint that never moved told nothing of its noise.
     still = ex.grams.rows.sum(axis=0) == 0
     level = np.where(still, UNKNOWN_NOISE * matters.torque, np.median(ex.noise.level, axis=0))
@@ -168,7 +169,7 @@ class _Table:
         return tuple(self.of((i, *others)) for i in alike)
 
     def gram(
-        self, ex: Explanation, loose: tuple[int, ...], reference: np.ndarray
+        self, ex: Explanation, loose: tuple[int, ...], matters: Reference
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Gram matrix of the recordings over the new columns, their prior scales, and reference strengths in these."""
         nuisances = ex.data.nuisances
@@ -178,9 +179,11 @@ class _Table:
         index = np.concatenate(
             [np.arange(nuisances), ex.problem.columns(loose), nuisances + amplitudes, [H.shape[0] - 1]]
         )
+        # What these recordings don't excite has no prior scale of theirs: that of lively motion stands in.
+        likely = TYPICAL_SHARE / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
         scale = ex.data.scale[nuisances + amplitudes]
-        strength = np.divide(reference[amplitudes], scale, out=np.zeros(len(scale)), where=scale > 0)
-        return H[np.ix_(index, index)], scale, strength
+        scale = np.where(matters.in_prior_units(amplitudes, scale) == 0.0, likely, scale)
+        return H[np.ix_(index, index)], scale, matters.in_prior_units(amplitudes, scale)
 
 
 def _key(c: Candidate) -> tuple[str, tuple[int, ...]]:
