@@ -150,7 +150,7 @@ def test_a_drive_that_lags_gives_what_was_asked_for_one_time_constant_ago():
     real = torque_along(robot.without("actuator_lag"), run)
     tau = np.asarray(run.tau)
     settled = slice(200, None)
-    asked = np.interp(run.t - 0.01, run.t, tau[:, 0])
+    asked = np.asarray(np.interp(run.t - 0.01, run.t, tau[:, 0]))
     off = np.sqrt(np.mean((real[settled, 0] - asked[settled]) ** 2))
     unlagged = np.sqrt(np.mean((real[settled, 0] - tau[settled, 0]) ** 2))
     assert 0.0 < off < 0.4 * unlagged  # a lag is a delay but for the curvature of the torque

@@ -133,6 +133,7 @@ def test_expected_log_odds_grow_with_what_is_added_and_start_at_those_of_the_rec
     open_ = undecided_pair()
     questions = Questions(arm()[1], open_)
     lively = questions.gram(fourier_motion(arm()[1], 8.0, open_.band.rate, seed=4))
+    assert lively is not None
     (pair,) = open_.pairs
     now, more, most = (questions.log_odds(k * lively, pair) for k in (0.0, 0.1, 1.0))
     assert np.isfinite([now, more, most]).all() and now < more < most

@@ -46,7 +46,7 @@ class CorrectedRobot(AbstractPlant):
 
     Attributes:
         robot: The model with refitted inertials.
-        nominal: The model as given; what effects see of the rigid body is its own, as in the fit.
+        nominal: The model as given; the load that effects start from is its own, as in the fit.
         rest_speed: Speed over which the sign of qd is rounded off [rad/s or m/s], shape (n,).
         effects: What acts beside the rigid bodies.
         ahead: What the robot's geometry says before any sample is seen.
@@ -98,7 +98,8 @@ class CorrectedRobot(AbstractPlant):
         Returns:
             tau [N m or N], shape (T, n); on the grid of `predict`, what that gives.
         """
-        return _torque(self, *(jnp.asarray(x, float) for x in (t, q, qd, qdd)))
+        t, q, qd, qdd = (jnp.asarray(x, float) for x in (t, q, qd, qdd))
+        return _torque(self, t, q, qd, qdd)
 
     def forward_dynamics(self, q: Joints, qd: Joints, tau: Joints, t: float | Scalar = 0.0) -> Joints:
         """Acceleration under the torque that the controller asks for; the inverse of `inverse_dynamics`.
@@ -207,7 +208,7 @@ def _torque(
     dt = jnp.mean(jnp.diff(t)) if len(t) > 1 else 1.0
     rate = lambda x: jnp.asarray(jnp.gradient(x, dt, axis=0)) if len(t) > 1 else jnp.zeros_like(x)  # noqa: E731
     since = t - t[0] if len(t) > 1 else t
-    sensed = Sensitivities(robot.nominal, robot.ahead, q, qd, qdd)
+    sensed = Sensitivities(robot.robot, robot.ahead, q, qd, qdd)
 
     def summed(_, torques):
         load, total, _ = torques

@@ -17,7 +17,7 @@ class Sensitivities(eqx.Module):
     """The fields of `effects.RigidBody`, as derivatives in JAX instead of differences.
 
     Attributes:
-        robot: The nominal model.
+        robot: The model, with refitted inertials.
         ahead: Its plan.
         q, qd, qdd: The motion, shape (T, n).
     """
