@@ -79,17 +79,21 @@ def judged(values: dict[str, np.ndarray], arm3: int) -> list[dict]:
     for c, condition in enumerate(CONDITIONS):
         of = lambda x, c=c: x[:, :, c]  # noqa: E731
         told += [
-            smaller(f"{condition}: PSO rises faster than QPSO", of(rise)[1], of(rise)[2]),
-            smaller(f"{condition}: PSO settles faster than QPSO", of(settling)[1], of(settling)[2]),
-            smaller(f"{condition}: PSO overshoots less than QPSO", of(overshoot)[1], of(overshoot)[2]),
-            smaller(f"{condition}: PSO has the lower steady-state error", of(steady)[1], of(steady)[2]),
+            smaller(f"{condition}: PSO rises faster than QPSO", of(rise)[1], of(rise)[2], "s"),
+            smaller(f"{condition}: PSO settles faster than QPSO", of(settling)[1], of(settling)[2], "s"),
+            smaller(f"{condition}: PSO overshoots less than QPSO", of(overshoot)[1], of(overshoot)[2], "%"),
+            smaller(f"{condition}: PSO has the lower steady-state error", of(steady)[1], of(steady)[2], "rad"),
             smaller(
-                f"{condition}: QPSO tracks like the reference, PSO less so", off(of(tracking), 2), off(of(tracking), 1)
+                f"{condition}: QPSO tracks like the reference, PSO less so",
+                off(of(tracking), 2), off(of(tracking), 1), "rad away",
             ),
-            smaller(f"{condition}: QPSO's torque is nearer to the reference's", of(apart)[2], of(apart)[1]),
-            smaller(f"{condition}: QPSO's torque is smoother than PSO's", of(rough)[2], of(rough)[1]),
-            smaller(f"{condition}: QPSO's energy is nearer to the reference's", off(of(energy), 2), off(of(energy), 1)),
-        ]
+            smaller(f"{condition}: QPSO's torque is nearer to the reference's", of(apart)[2], of(apart)[1], "N m away"),
+            smaller(f"{condition}: QPSO's torque is smoother than PSO's", of(rough)[2], of(rough)[1], "N m/s"),
+            smaller(
+                f"{condition}: QPSO's energy is nearer to the reference's",
+                off(of(energy), 2), off(of(energy), 1), "J away",
+            ),
+        ]  # fmt: skip
     worse = tracking[:, :, 1].mean(axis=1) > tracking[:, :, 0].mean(axis=1)
     told.append({
         "statement": "disturbed: all models track worse", "ours": f"{int(worse.sum())} of {len(MODELS)} do",
@@ -103,7 +107,7 @@ def off(x: np.ndarray, model: int) -> np.ndarray:
     return np.abs(x[model] - x[0])
 
 
-def smaller(statement: str, x: np.ndarray, y: np.ndarray) -> dict:
+def smaller(statement: str, x: np.ndarray, y: np.ndarray, unit: str = "") -> dict:
     """Whether x is smaller than y over the seeds.
 
     Mann-Whitney's two-sided p, its effect P(x < y) - P(x > y), and the interval of the difference of means.
@@ -115,10 +119,16 @@ def smaller(statement: str, x: np.ndarray, y: np.ndarray) -> dict:
     level = np.ptp(values) <= LEVEL * np.abs(values).max()
     test = difference(values[: x.size], values[x.size :])
     return {
-        "statement": statement, "ours": f"{np.median(x):.4g} against {np.median(y):.4g} (medians)",
+        "statement": statement, "ours": f"{_median(x)} against {_median(y)} {unit}".strip(),
+        "medians": [_median(x), _median(y)], "unit": unit,
         "p": 1.0 if level else test["p_value"], "effect": 0.0 if level else 2.0 * test["superiority"] - 1.0,
         "interval": [test["low"], test["high"]] if known and not level else None,
     }  # fmt: skip
+
+
+def _median(x: np.ndarray) -> str:
+    middle = np.median(np.nan_to_num(x, nan=np.inf))
+    return f"{middle:.4g}" if np.isfinite(middle) else "never"
 
 
 def give_verdicts(claims: dict[str, list[dict]]) -> None:

@@ -1,10 +1,7 @@
 """The study's readings and their table, with small swarms."""
 
-import json
 import math
-import os
 import pathlib
-import subprocess
 import sys
 
 import pytest
@@ -50,19 +47,23 @@ def test_the_same_reading_gives_the_same_row():
     assert first == second
 
 
-def test_the_table_is_made_whole_and_goes_on_where_it_stopped(tmp_path):
-    command = [sys.executable, "experiments/table3_swarms.py", "--smoke", "--out", str(tmp_path)]
-    command += ["--figures", str(tmp_path / "figures")]
-    env = os.environ | {"PYTHONPATH": str(ROOT)}
-    run = lambda: subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, timeout=300)  # noqa: E731
-    first = run()
-    assert first.returncode == 0, first.stderr
-    lines = (tmp_path / "table3_swarms.jsonl").read_text().splitlines()
-    table = json.loads((tmp_path / "table3_swarms.json").read_text())
-    assert len(table["readings"]) == len(lines)
-    assert max(row["com"] for row in table["baselines"]) < 1e-10  # [%] one linear solve
-    assert sorted(path.name for path in (tmp_path / "figures").iterdir()) == [f"figure{k}.svg" for k in (6, 7, 8, 9)]
-    # Interrupted after three readings, it adds the others and ends at the same table.
-    (tmp_path / "table3_swarms.jsonl").write_text("\n".join(lines[:3]) + "\n")
-    assert run().returncode == 0
-    assert json.loads((tmp_path / "table3_swarms.json").read_text())["readings"] == table["readings"]
+def test_an_interrupted_sweep_adds_what_is_missing_and_ends_at_the_same_rows(tmp_path):
+    config = table3_swarms.Config(smoke=True, out=tmp_path)
+    arm = config.arm()
+    rows = table3_swarms.run(config, arm)
+    path = tmp_path / "table3_swarms.jsonl"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:2]))
+    assert table3_swarms.run(config, arm) == rows
+    assert len(path.read_text().splitlines()) == len(rows)
+
+
+def test_one_linear_solve_beats_every_swarm():
+    baselines = table3_swarms.baselines(table3_swarms.Config().arm(), few=True)
+    assert max(max(row["com"] + row["inertia"]) for row in baselines) < 1e-10  # [%] round-off
+
+
+def test_what_is_zero_in_the_reference_is_not_sought():
+    arm = table3_swarms.Config(joints=6).arm()
+    left = {name for name, sought in zip(arm.names, arm.searched, strict=True) if not sought}
+    assert left == {"cy6", "Ixy6", "Iyz6"}  # as in the robot's file
+    assert study_readings.objective(study_readings.Reading("pso"), arm).reference.shape == (6 * 9 - 3,)

@@ -1,0 +1,122 @@
+"""The whole study: every table and figure, published beside ours, and a page that says what holds.
+
+    python experiments/reproduce_all.py                               # the study's arm; an hour on one core
+    python experiments/reproduce_all.py --robot arm.xml [--joints n]  # the same tables for any other arm
+    python experiments/reproduce_all.py --smoke                       # all steps as small as can be, in a new folder
+
+A step whose result is there for the same choices is left out (--again runs it nevertheless); an interrupted step goes
+on after the last part it stored.  The page, docs/study.md for the study's arm, is written anew each time.
+"""
+
+import dataclasses
+import hashlib
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+
+import study_page
+import table3_swarms
+import table4_control
+import tables_1_2_arm
+import torque_swarms
+import tracking_swarms
+import tyro
+from study_arm import StudyArm, StudyConfig
+
+RECORD = "study_steps.json"
+
+
+@dataclasses.dataclass(frozen=True)
+class Config(StudyConfig):
+    """Which arm, and where to write.
+
+    Attributes:
+        again: Run every step, whether its result is there or not.
+    """
+
+    again: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """A part of the study.
+
+    Attributes:
+        title: What it makes.
+        run: Makes it.
+        outputs: Files that are there when it is done.
+        depends: What its result depends on; a change makes it run again.
+    """
+
+    title: str
+    run: Callable[[], None]
+    outputs: tuple[pathlib.Path, ...]
+    depends: str
+
+    @property
+    def mark(self) -> str:
+        """What it depends on, in one number."""
+        return hashlib.sha256(self.depends.encode()).hexdigest()
+
+
+def steps(config: Config, arm: StudyArm) -> list[Step]:
+    """All parts, in the order in which they need each other."""
+    folder, figures = config.folder(arm), config.figure_folder(arm)
+    shared = {"robot": config.robot, "joints": config.joints, "smoke": config.smoke, "out": folder, "figures": figures}
+    found, so_far = [], f"{arm.name} {arm.x.tolist()}"
+    for title, module, results, pictures in (
+        ("tables 1 and 2: the arm", tables_1_2_arm, ("tables_1_2",), ()),
+        ("table 3, figures 6 to 9: swarms on known answers", table3_swarms, ("table3_swarms", "table3_sets"),
+         [f"figure{k}.svg" for k in range(6, 10)]),
+        ("table 4, figures 14 to 17: sliding mode control", table4_control, ("table4_control",),
+         [f"figure{k}.png" for k in range(14, 18)]),
+        ("beyond: swarms on torque", torque_swarms, ("torque_swarms",), ()),
+        ("beyond: swarms on tracking, smoothness, energy", tracking_swarms, ("tracking_swarms",),
+         ["figure_tracking.svg"]),
+    ):  # fmt: skip
+        outputs = (*(folder / f"{name}.json" for name in results), *(figures / name for name in pictures))
+        own = module.Config(**shared)
+        so_far += f" {title} {own.said()}"
+        found.append(Step(title, lambda m=module, c=own: m.main(c), outputs, so_far))
+    network = pathlib.Path(__file__).with_name("mlp_kinematics.py")
+    # The network learns the IRB 140's own kinematics, whatever the arm; it has a smoke run of its own.
+    if network.is_file() and arm.is_studys and not config.smoke:
+        command = [sys.executable, str(network), "--out", str(folder), "--figures", str(figures)]
+        outputs = (folder / "mlp_kinematics.json", figures / "figure12.svg")
+        run = lambda: None if subprocess.run(command, check=True) else None  # noqa: E731
+        found.append(Step("figure 12: the network for the kinematics", run, outputs, "mlp"))
+    return found
+
+
+def run(config: Config, arm: StudyArm) -> pathlib.Path:
+    """Every step that is not done, then the page; returns its path."""
+    record = config.folder(arm) / RECORD
+    done = json.loads(record.read_text(encoding="utf-8")) if record.is_file() else {}
+    parts = steps(config, arm)
+    for number, step in enumerate(parts, start=1):
+        print(f"[{number}/{len(parts)}] {step.title}", flush=True)
+        there = done.get(step.title) == step.mark and all(path.is_file() for path in step.outputs)
+        if there and not config.again:
+            print("      there already", flush=True)
+            continue
+        started = time.perf_counter()
+        step.run()
+        done[step.title] = step.mark
+        record.write_text(json.dumps(done, indent=1) + "\n", encoding="utf-8")
+        print(f"      done in {time.perf_counter() - started:.0f} s", flush=True)
+    return study_page.write(config, arm)
+
+
+def main() -> None:
+    config = tyro.cli(Config)
+    if config.smoke and config.out is None:
+        config = dataclasses.replace(config, out=pathlib.Path(tempfile.mkdtemp(prefix="study_")))
+    print(run(config, config.arm()))
+
+
+if __name__ == "__main__":
+    main()

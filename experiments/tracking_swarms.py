@@ -1,0 +1,250 @@
+"""The study's future research: swarms judged by the tracking, torque smoothness or energy of a controlled motion.
+
+    python experiments/tracking_swarms.py [--robot arm.xml] [--joints n] [--smoke]
+
+A candidate is what the controller believes of the arm; the arm itself is the true one.  Each candidate drives the arm
+along a lively motion for some seconds.  Two questions: what do these objectives identify, and which parameters can no
+closed loop see?  Every search is stored when it is done.  Writes tracking_swarms.json and .md, and figure_tracking.svg.
+"""
+
+import dataclasses
+import hashlib
+import itertools
+import json
+import pathlib
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import tyro
+from jaxtyping import Array, Float
+from study_arm import StudyArm, StudyConfig
+from study_readings import ITERATIONS, PARTICLES, Reading, rule
+from tracking_report import figure, page
+
+from irb140_jax import control, identify, simulate, swarm
+from irb140_jax.compilation_cache import set_up_compilation_cache
+from irb140_jax.dynamics import regressor_batch
+from irb140_jax.recordings.excite import fourier_motion
+from irb140_jax.robot import Robot
+from irb140_jax.trajectory import Trajectory
+from irb140_jax.types import Scalar
+
+OBJECTIVES = ("tracking", "smoothness", "energy", "all three")
+# Both algorithms with the weight that decreases as section 2.7 says, and a limit to speed: they converge.
+RULES = {
+    "PSO": rule(Reading("pso", "w 0.99 to 0.4", 0.1)),
+    "QPSO": rule(Reading("qpso", "w 0.99 to 0.4", 0.05)),
+}
+ENCODER = np.radians(0.01)  # [rad] resolution of the IRB 140's joints by its specification
+VISIBLE_CHANGE = 0.1  # share by which parameters change when visibility is asked: between PSO's error and the box
+ROUND_OFF = 1e-9  # share of the largest singular value below which a direction is not there at all
+
+
+@dataclasses.dataclass(frozen=True)
+class Config(StudyConfig):
+    """What to run.
+
+    Attributes:
+        seeds: Runs of each search.
+        duration: Of the motion that a candidate is judged by [s].
+        dt: Half of a step of Runge-Kutta's [s].  Its error must stay below what the parameters do: Euler's own at 4 ms,
+            half a milliradian, is not zero at the truth, so that tracking would lead away from it.
+        width: Half of the box's width, as a fraction of the truth.
+        speed: Of the motion, as a share of the joints' largest speeds.
+    """
+
+    seeds: int = 6
+    duration: float = 1.6
+    dt: float = 0.002
+    width: float = 0.5
+    speed: float = 0.6
+
+    @property
+    def size(self) -> dict[str, Any]:
+        """Particles and iterations."""
+        return {"particles": 6, "iterations": 3} if self.smoke else {"particles": PARTICLES, "iterations": ITERATIONS}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Loop:
+    """A closed loop as a function of what the controller believes.
+
+    Attributes:
+        study: The arm and what is sought of it.
+        plant: The true arm.
+        reference: The motion.
+        regressor: Of torque along it, shape (S, n, 10 n).
+    """
+
+    study: StudyArm
+    plant: Robot
+    reference: control.Reference
+    regressor: np.ndarray
+
+    def motion(self, x: Float[Array, " d"], integrator: simulate.AbstractIntegrator) -> Trajectory:
+        """The arm's motion under a controller that believes x; gains are those of the true model."""
+        gain = control.sliding_mode(self.plant).gain
+        controller = control.sliding_mode(self.model(x), gain=gain)
+        return simulate.rollout(self.plant, controller, self.reference, integrator=integrator)
+
+    def model(self, x: Float[Array, " d"]) -> Robot:
+        """The true arm with the inertials of x; its geometry stays concrete, which compiles to quicker code."""
+        believed = self.study.reduced(x)
+        return eqx.tree_at(lambda r: (r.com, r.inertia), self.plant, (believed.com, believed.inertia))
+
+    def torque(self, x: Float[Array, " d"]) -> Float[Array, "S n"]:
+        """Joint torques along the wanted motion, rotors left out."""
+        return jnp.asarray(self.regressor) @ self.model(x).phi.ravel()
+
+    def measures(self, x: Float[Array, " d"]) -> dict[str, Scalar]:
+        """Tracking error [rad or m], roughness [N m/s or N/s] and energy [J], all joints together."""
+        run = self.motion(x, simulate.RungeKutta4())
+        tracking = simulate.tracking_error(run, self.reference.q[: 2 * len(run.t) : 2])
+        energy, _ = simulate.energies(run)
+        return {
+            "tracking": jnp.linalg.norm(tracking), "smoothness": jnp.linalg.norm(simulate.roughness(run)),
+            "energy": jnp.sum(energy[-1]),
+        }  # fmt: skip
+
+
+    @cached_property
+    def measures_of(self) -> Callable[[Float[Array, "s d"]], dict[str, Float[Array, " s"]]]:
+        """Of many sets at once, compiled once."""
+        return jax.jit(jax.vmap(self.measures))
+
+
+def loop_of(config: Config, study: StudyArm, seed: int) -> Loop:
+    """A Fourier motion of the first joints."""
+    plant = study.reduced()
+    rotors = plant.armature if not study.is_studys else jnp.zeros(plant.n)
+    plant = eqx.tree_at(lambda r: r.armature, plant, rotors)
+    played = fourier_motion(plant, config.duration, 1.0 / config.dt, seed=seed, speed=config.speed)
+    reference = control.Reference(*map(jnp.asarray, (played.t, played.q, played.qd, played.qdd)))
+    regressor = np.asarray(regressor_batch(plant, reference.q, reference.qd, reference.qdd))
+    return Loop(study, plant, reference, regressor)
+
+
+def objective(name: str, loop: Loop, truth: dict[str, float]) -> Callable[[Float[Array, " u"], Scalar], Scalar]:
+    """Fitness of the unknowns: one measure, or all three, each as a multiple of what the true model reaches."""
+
+    def fitness(unknowns: Float[Array, " u"], progress: Scalar) -> Scalar:
+        measures = loop.measures(loop.study.full(unknowns))
+        return measures[name] if name in measures else jnp.sum(jnp.stack([measures[k] / truth[k] for k in measures]))
+
+    return fitness
+
+
+def seen(loop: Loop) -> dict:
+    """Which parameters the closed loop shows: singular values of d(joint errors)/dx at the truth, x in units of itself.
+
+    A parameter's share is the squared length of its projection onto the directions that show at all; torque's own
+    share, through the regressor along the same motion, stands beside it.
+    """
+    study, x = loop.study, loop.study.x
+    sought = np.flatnonzero(study.searched)
+    size = jnp.abs(x[sought])
+    # Derivatives by the simpler integrator: its own error does not depend on what the controller believes.
+    errors = lambda y: loop.motion(study.full(y * size), simulate.SemiImplicitEuler()).q.ravel()  # noqa: E731
+    J = np.asarray(jax.jit(jax.jacfwd(errors))(x[sought] / size))
+    torques = lambda y: loop.torque(study.full(y * size)).ravel()  # noqa: E731
+    Y = np.asarray(jax.jit(jax.jacfwd(torques))(x[sought] / size))
+    told: dict[str, Any] = {"names": [study.names[i] for i in sought]}
+    for name, matrix in (("tracking", J), ("torque", Y)):
+        _, values, directions = np.linalg.svd(matrix, full_matrices=False)
+        shown = values > ROUND_OFF * values[0]
+        told[name] = {
+            "rank": int(shown.sum()), "singular_values": values.tolist(),
+            "share": np.sum(directions[shown] ** 2, axis=0).tolist(),
+        }  # fmt: skip
+    # Root mean square over the samples of a joint error that a change along each direction makes.
+    rms = np.array(told["tracking"]["singular_values"]) * VISIBLE_CHANGE / np.sqrt(len(J) / loop.plant.n)
+    told["above_encoder"] = int((rms > ENCODER).sum())
+    return told
+
+
+def search(config: Config, loop: Loop, name: str, algorithm: str, truth: dict[str, float]) -> dict[str, np.ndarray]:
+    """What the seeds of one search found."""
+    study = loop.study
+    place = jnp.asarray(np.random.default_rng(0).uniform(size=study.x.shape))
+    lower, upper = (end[study.searched] for end in identify.box(study.x, config.width, place=place))
+    found = swarm.minimise(
+        objective(name, loop, truth), RULES[algorithm], lower, upper, keys=swarm.seed_keys(config.seeds), **config.size
+    )
+    return {"x": np.asarray(study.full(found.x)), "fitness": np.asarray(found.fitness)}
+
+
+def judged(name: str, algorithm: str, x: np.ndarray, loops: tuple[Loop, Loop]) -> dict:
+    """One row: errors of the parameters, and what the set does in the loop that was searched and in another."""
+    study = loops[0].study
+    com, inertia = study.mape(x)
+    own, other = (loop.measures_of(jnp.asarray(x)) for loop in loops)
+    mean = lambda values: float(np.mean(np.asarray(values)))  # noqa: E731
+    tau, true = (np.asarray(jax.vmap(loops[1].torque)(jnp.asarray(y))) for y in (x, np.asarray(study.x)[None]))
+    return {
+        "objective": name, "algorithm": algorithm, "com": mean(com), "inertia": mean(inertia),
+        "runs": {"com": com.tolist(), "inertia": inertia.tolist(),
+                 **{key: np.asarray(value).tolist() for key, value in own.items()}},
+        "measures": {key: mean(value) for key, value in own.items()},
+        "unseen": {key: mean(value) for key, value in other.items()},
+        "torque_rmse": float(np.sqrt(np.mean((tau - true) ** 2))),
+    }  # fmt: skip
+
+
+def run(config: Config, study: StudyArm) -> dict:
+    """All searches, those stored already taken from there; the truth and the box's middle beside them."""
+    first = loop_of(config, study, seed=1)
+    loops = first, first if config.smoke else loop_of(config, study, seed=2)
+    alike = lambda x: jnp.tile(jnp.asarray(x), (config.seeds, 1))  # noqa: E731  in the shape that is compiled anyway
+    truth, unseen = (
+        {key: float(value[0]) for key, value in loop.measures_of(alike(study.x)).items()} for loop in loops
+    )
+    folder = config.folder(study) / "tracking_runs"
+    folder.mkdir(exist_ok=True)
+    mark = hashlib.sha256(repr((config.said(), np.asarray(study.x).tolist())).encode()).hexdigest()
+    rows = []
+    tried = [("tracking", "PSO")] if config.smoke else itertools.product(OBJECTIVES, RULES)
+    for name, algorithm in tried:
+        path = folder / f"{name.replace(' ', '_')}_{algorithm}.npz"
+        x = _stored(path, mark, lambda n=name, a=algorithm: search(config, loops[0], n, a, truth))
+        rows.append(judged(name, algorithm, x, loops))
+        print(f"  done: {name}, {algorithm}", flush=True)
+    place = np.random.default_rng(0).uniform(size=study.x.shape)
+    lower, upper = identify.box(study.x, config.width, place=jnp.asarray(place))
+    middle = judged("middle of the box", "", np.asarray(alike(0.5 * (lower + upper))), loops)
+    return {
+        "arm": study.name, "truth": truth, "truth_unseen": unseen, "rows": [*rows, middle], "seen": seen(loops[0]),
+    }  # fmt: skip
+
+
+def _stored(path: pathlib.Path, mark: str, compute: Callable[[], dict[str, np.ndarray]]) -> np.ndarray:
+    """The sets of a search, computed unless they are stored for the same choices."""
+    if path.is_file():
+        with np.load(path) as there:
+            if str(there["mark"]) == mark:
+                return there["x"]
+    found, part = compute(), path.with_suffix(".part.npz")
+    np.savez(part, mark=np.array(mark), x=found["x"], fitness=found["fitness"])
+    part.replace(path)
+    return found["x"]
+
+
+def main(config: Config) -> None:
+    """Search, judge, write."""
+    set_up_compilation_cache()
+    config = dataclasses.replace(config, seeds=2, duration=0.2) if config.smoke else config
+    study = config.arm()
+    folder = config.folder(study)
+    result = {"config": config.said()} | run(config, study)
+    (folder / "tracking_swarms.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    (folder / "tracking_swarms.md").write_text(page(result), encoding="utf-8")
+    figure(result, config.figure_folder(study) / "figure_tracking.svg")
+    print(page(result))
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Config))
