@@ -109,6 +109,7 @@ class AbstractEffect(abc.ABC):
         dissipative: It can only take energy out of the arm, at every instant.
         mjcf: How MJCF expresses it, all of it or a part (see `in_model`), or None.
         not_in_mjcf: What of it MJCF can't express and why, one sentence without its full stop; "" where nothing is.
+        leans_on_inertials: Its torque is made of the rigid body's own, so it is known no better than the inertials.
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
         scouts: Its grid of shapes is looked for in the residual (see `scout`).
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
@@ -131,6 +132,7 @@ class AbstractEffect(abc.ABC):
     dissipative: ClassVar[bool] = False
     mjcf: ClassVar[str | None] = None
     not_in_mjcf: ClassVar[str] = "MJCF has no such torque"
+    leans_on_inertials: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
     scouts: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)

@@ -21,6 +21,7 @@ class JointElasticity(AbstractEffect):
         "encoder_offset": "postures with gravity of either sign",
     }
     needs = "fast motion near the first resonance, or large gravity of either sign"
+    leans_on_inertials = True
     everywhere = True
     history = "bends with the rate of its load, which takes a state of the link beside that of the motor"
     not_in_mjcf = "it is left out: a flexible joint takes a second joint, and the model another size"

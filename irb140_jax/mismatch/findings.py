@@ -45,26 +45,19 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
 
 
 def _parameters(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray) -> dict[str, Any]:
-    """Physical parameters and their standard deviations by the delta method over amplitudes and shape."""
+    """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt."""
     c = ex.data.candidates[index]
-    full = np.zeros(max(max(v) for v in c.effect.variants) + 1)
-
-    def physical(x: np.ndarray) -> np.ndarray:
-        full[list(c.variant)] = x[: len(w)]
-        return np.asarray(c.effect.physical(jnp.asarray(full), jnp.asarray(x[len(w) :])))
-
-    at = np.concatenate([w, c.shape])
-    value = physical(at)
-    joint_cov = np.zeros((len(at), len(at)))
-    joint_cov[: len(w), : len(w)] = cov
-    joint_cov[len(w) :, len(w) :] = np.diag(_shape_variance(ex, index))
+    value = _physical(c, w)
     slope = np.stack([
-        (physical(at + step) - physical(at - step)) / (2 * step.sum())
-        for step in np.diag(1e-5 * np.maximum(np.abs(at), 1e-6))
+        (_physical(c, w + step) - _physical(c, w - step)) / (2 * step.sum())
+        for step in np.diag(1e-5 * np.maximum(np.abs(w), 1e-6))
     ], axis=1)  # fmt: skip
-    variance = np.einsum("pk,kl,pl->p", slope, joint_cov, slope)
+    variance = np.einsum("pk,kl,pl->p", slope, cov, slope) + _variance_over_shapes(ex, index, value)
+    if c.effect.leans_on_inertials:
+        variance = variance + (value * _inertial_doubt(ex, c)) ** 2
     slide = robot.is_slide[c.joints[0]]
-    present = range(len(value)) if len(c.variant) == len(full) else [i for i in c.variant if i < len(value)]
+    whole = len(c.variant) == max(max(v) for v in c.effect.variants) + 1
+    present = range(len(value)) if whole else [i for i in c.variant if i < len(value)]
     return {
         c.effect.parameters[i].name: {
             "value": float(value[i]), "std": float(np.sqrt(max(variance[i], 0.0))),
@@ -74,28 +67,51 @@ def _parameters(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: n
     }  # fmt: skip
 
 
-def _shape_variance(ex: Explanation, index: int) -> np.ndarray:
-    """Variance of continuous shapes from the evidence over their refined grid."""
+def _physical(c: Candidate, w: np.ndarray) -> np.ndarray:
+    """Physical parameters from the amplitudes that a candidate uses."""
+    full = np.zeros(max(max(v) for v in c.effect.variants) + 1)
+    full[list(c.variant)] = w
+    return np.asarray(c.effect.physical(jnp.asarray(full), jnp.asarray(c.shape)))
+
+
+def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:
+    """Variance of the physical parameters over the refined grid of shapes, amplitudes fitted anew at each."""
     c = ex.data.candidates[index]
     if not c.effect.refines():
-        return np.zeros(len(c.shape))
+        return np.zeros(len(value))
     alike = [
         i
         for i, o in enumerate(ex.data.candidates)
         if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant
     ]
     gain = ex.problem.scores(_others(ex, index), c.joints)[alike]
-    shapes = np.array([ex.data.candidates[i].shape for i in alike])
     gain = np.where(np.isfinite(gain), gain, -np.inf)
-    if not np.isfinite(gain).any():
-        return np.ptp(shapes, axis=0) ** 2
-    p = np.exp(gain - gain.max())
+    p = np.exp(gain - gain.max()) if np.isfinite(gain).any() else np.ones(len(alike))
     p /= p.sum()
-    spread = shapes - p @ shapes
-    variance = p @ (spread * spread)
+    shapes = np.array([ex.data.candidates[i].shape for i in alike])
+    off = np.abs(shapes - c.shape) / np.maximum(np.ptp(shapes, axis=0), 1e-300)
+    nearest = set(np.argsort(off.sum(axis=1))[1 : 1 + 2 * shapes.shape[1]].tolist())
+    refitted = {k: _refitted(ex, index, alike[k]) for k in range(len(alike)) if p[k] > 1e-3 or k in nearest}
+    between = np.sum([p[k] * (v - value) ** 2 for k, v in refitted.items()], axis=0)
     # A posterior narrower than the grid is known to the grid's spacing.
-    spacing = np.array([min([*np.diff(np.unique(x)).tolist(), float(np.ptp(x)) + 1e-12]) for x in shapes.T])
-    return np.maximum(variance, spacing**2 / 12.0)
+    steps = [np.abs(refitted[k] - value) for k in nearest]
+    spacing = np.min(steps, axis=0) if steps else np.zeros(len(value))
+    return np.maximum(between, spacing**2 / 12.0)
+
+
+def _refitted(ex: Explanation, index: int, other: int) -> np.ndarray:
+    """Physical parameters where another candidate of the same kind stands in a finding's place."""
+    post = full_posterior(ex.data, ex.problem, ex.grams, (*_others(ex, index), other))
+    c = ex.data.candidates[other]
+    k = len(c.columns)
+    return _physical(c, (post.mean * ex.data.scale[post.columns])[-k:])
+
+
+def _inertial_doubt(ex: Explanation, c: Candidate) -> float:
+    """Relative standard deviation left in the inertials of the links that a joint carries, root mean square."""
+    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    carried = slice(10 * min(c.joints), ex.data.nuisances)
+    return float(ex.data.scale[0] * np.sqrt(np.mean(np.diag(post.cov)[carried])))
 
 
 def _evidence(ex: Explanation, index: int) -> dict[str, float]:
