@@ -149,7 +149,7 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
             pairs = [np.hstack([mine(x), x[:, [i]]]) for x in (q, qd)]
             drive = np.hstack([qdd[:, [i]], load[:, [i]], mine(qd) * qd[:, [i]]])
             features = np.hstack([*(_features(x) for x in pairs), drive])
-            out.append(Competitor(f"{name} beside the joint's own motion", features, fold, True))
+            out.append(Competitor(f"the motion of {name} together with the joint's own", features, fold, True))
     return [*out, _time(stretches, rows)]
 
 
@@ -214,7 +214,7 @@ def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
     for _, own in features:
         phi[row : row + len(own), column : column + own.shape[1]] = own
         row, column = row + len(own), column + own.shape[1]
-    return Competitor("time", phi, np.concatenate(folds), False)
+    return Competitor("time, more than any motion", phi, np.concatenate(folds), False)
 
 
 def _scores(c: Competitor, Y: np.ndarray) -> np.ndarray:
