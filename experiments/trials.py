@@ -129,7 +129,8 @@ def case_of(kind: Kind, seed: int) -> tuple[Arm, ConcealedCase, Noise, str]:
 
 # Physics outside the library that needs no second joint.
 ALONE = (
-    "saturation", "hum", "slosh", "snap_through", "back_emf_sag", "drive_dead_zone", "drifting_zero", "leaking_tank",
+    "magnetic_saturation", "hum", "slosh", "snap_through", "back_emf_sag", "drive_dead_zone", "drifting_zero",
+    "leaking_tank",
 )  # fmt: skip
 
 

@@ -16,6 +16,8 @@ from scipy import linalg
 from irb140_jax.mismatch.candidates import Candidate, Stretch
 from irb140_jax.mismatch.noise import Noise
 
+ROUNDING = 1e-12  # relative; a log of nonsense can make columns that are equal to a dozen digits
+
 
 @dataclasses.dataclass(frozen=True)
 class Grams:
@@ -76,12 +78,16 @@ def grams(stretches: list[Stretch], noise: Noise, scale: np.ndarray, nuisances: 
     return Grams(np.concatenate(out), per_joint, np.array(of), np.concatenate(rows), nuisances)
 
 
+def with_prior(G: np.ndarray) -> np.ndarray:
+    """Gram matrix of amplitudes with their unit prior; far beyond it, what rounding leaves of a singular matrix."""
+    return G + np.diag(1.0 + ROUNDING * np.diag(G))
+
+
 def eliminated(H: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
     """Gram matrix after marginalising some columns (unit prior), and the log determinant that this costs."""
     if len(columns) == 0:
         return H, 0.0
-    M = H[np.ix_(columns, columns)] + np.eye(len(columns))
-    chol = linalg.cholesky(M, lower=True)
+    chol = linalg.cholesky(with_prior(H[np.ix_(columns, columns)]), lower=True)
     half = linalg.solve_triangular(chol, H[columns], lower=True)
     return H - half.T @ half, 2.0 * float(np.log(np.diag(chol)).sum())
 
@@ -97,7 +103,7 @@ class Posterior:
 
 def posterior(H: np.ndarray, columns: np.ndarray) -> Posterior:
     """Posterior of the given columns (unit prior) from a Gram matrix whose last column is y."""
-    M = H[np.ix_(columns, columns)] + np.eye(len(columns))
+    M = with_prior(H[np.ix_(columns, columns)])
     cov = linalg.cho_solve(linalg.cho_factor(M), np.eye(len(columns)))
     return Posterior(columns, cov @ H[columns, -1], cov)
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.evidence import Layout, gain_of, gains, layouts, posterior
+from irb140_jax.mismatch.evidence import Layout, gain_of, gains, layouts, posterior, with_prior
 
 ACCEPT = np.log(100.0)  # posterior odds a finding needs; under the null, a bound of 1 % on a false one (Markov)
 PREFER = np.log(20.0)  # odds at which a law replaces the simpler one that it contains
@@ -91,7 +91,7 @@ class Problem:
         c = self.columns(chosen)
         if len(c) == 0:
             return H
-        half = np.linalg.solve(np.linalg.cholesky(self.H[np.ix_(c, c)] + np.eye(len(c))), self.H[np.ix_(c, index)])
+        half = np.linalg.solve(np.linalg.cholesky(with_prior(self.H[np.ix_(c, c)])), self.H[np.ix_(c, index)])
         return H - half.T @ half
 
     def neighbourhood(self, joints: frozenset[int] | None) -> "Neighbourhood":

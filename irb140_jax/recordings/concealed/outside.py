@@ -54,29 +54,14 @@ class _OnOneJoint(Hidden):
         plant.torque[self.joint] -= self.parameters["size"] * float(pattern)
 
 
-class Saturation(_OnOneJoint):
-    """The drive gives nothing beyond a limit, `size`; nine tenths of the samples lie below, or the arm would fall."""
+class MagneticSaturation(_OnOneJoint):
+    """Iron that saturates: the more torque is asked, the smaller the share that comes, |tau| tau/(1 + |tau|)."""
 
-    slug = "saturation"
-
-    def look(self, survey: Survey):
-        super().look(survey)
-        self._sorted = np.sort(np.abs(survey.load[:, self.joint]))[::8]
-
-    @classmethod
-    def drawn(cls, joints, share, survey, rng):
-        unit = cls(joints, {"size": 0.0, "other": float(joints[0]), "draw": rng.uniform()})
-        unit.look(survey)
-        load = unit._sorted
-        cut = np.array([np.sqrt(np.mean(np.clip(load - limit, 0.0, None) ** 2)) for limit in load])
-        limit = load[int(np.argmin(np.abs(cut / survey.rms(joints[0]) - share)))]
-        unit.parameters["size"] = float(max(limit, np.quantile(load, 0.9)))
-        return unit
+    slug = "magnetic_saturation"
 
     def pattern(self, q, qd, tau, t):
-        tau = tau[..., self.joint]
-        limit = self.parameters["size"]
-        return (tau - np.clip(tau, -limit, limit)) / max(limit, 1e-300)
+        tau = tau[..., self.joint] / self.level
+        return np.abs(tau) * tau / (1.0 + np.abs(tau))
 
 
 class BackEmfSag(_OnOneJoint):
@@ -206,7 +191,7 @@ class LeakingTank(_OnOneJoint):
         return tau[..., self.joint] / self.level * (np.asarray(t) / self.end) ** 2
 
 
-TUNED_ON: tuple[type[Hidden], ...] = (Saturation, CrossDamping, RotorGyroscope, Hum, Slosh, SnapThrough)
+TUNED_ON: tuple[type[Hidden], ...] = (MagneticSaturation, CrossDamping, RotorGyroscope, Hum, Slosh, SnapThrough)
 JUDGED_ON: tuple[type[Hidden], ...] = (
     BackEmfSag, DeadZone, CableOverTwoJoints, DriftingZero, TorqueCrosstalk, LeakingTank,
 )  # fmt: skip
