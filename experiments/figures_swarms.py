@@ -8,6 +8,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from matplotlib.ticker import LogLocator  # noqa: E402
 
 COLOURS = {"reference": "0.35", "PSO": "tab:red", "QPSO": "tab:blue"}
 
@@ -25,7 +26,7 @@ def draw(stored: dict, folder: pathlib.Path) -> None:
 
 
 def _bars(sets: dict, reference: np.ndarray, part: np.ndarray, names: list[str], label: str, path: pathlib.Path):
-    """Values above, errors beneath: two estimates that agree to a few per cent look alike above."""
+    """Values above, errors beneath: estimates that agree to a few per cent look alike above."""
     names, reference = [names[i] for i in part], reference[part]
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(0.45 * len(names) + 2.5, 5.5))
     place = np.arange(len(names))
@@ -34,9 +35,13 @@ def _bars(sets: dict, reference: np.ndarray, part: np.ndarray, names: list[str],
         x = x[:, part]
         above.bar(place + 0.27 * k, x.mean(0), 0.27, yerr=x.std(0), color=COLOURS[name], label=name, capsize=2)
         error = 100.0 * np.abs(x / reference - 1.0).mean(0)
-        below.bar(place - 0.135 + 0.27 * k, error, 0.27, color=COLOURS[name])
+        below.plot(place, error, "o", color=COLOURS[name])
     below.set_xticks(place, names, rotation=60)
     below.set(ylabel="mean error [%]", yscale="log")
+    below.grid(axis="y", which="both", alpha=0.3)
+    below.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+    for formatter in (below.yaxis.set_major_formatter, below.yaxis.set_minor_formatter):
+        formatter(lambda value, _: f"{value:g}")
     above.set(ylabel=label)
     _finish(figure, above, path)
 

@@ -2,7 +2,7 @@
 
     python experiments/table4_control.py                  # three joints, as in the study; some minutes
     python experiments/table4_control.py --joints 6       # the whole arm
-    python experiments/table4_control.py --robot arm.xml  # any other arm
+    python experiments/table4_control.py --robot arm.xml  # any other arm; with the boundary layer only
     python experiments/table4_control.py --smoke          # a minute
 
 The identified sets are those that table3_swarms.py of the same arm stored.  Every reading is stored when it is done; an
@@ -214,7 +214,8 @@ def run(config: Config) -> dict:
     folder.mkdir(exist_ok=True)
     mark = _mark(config, sets, arm)
     readings = []
-    for law in LAWS[:1] if config.smoke else LAWS:
+    # Other arms show whether the findings carry over; the text's open choices are the study's own.
+    for law in LAWS if study.is_studys and not config.smoke else LAWS[:1]:
         compiled = runs_of(config, task, law)
         for side, kind in itertools.product(SIDES, ("of peak", "of torque")):
             name = " ".join((side, kind, *law)).replace(" ", "_")
