@@ -58,7 +58,7 @@ def page(folder: pathlib.Path, figures: str, is_studys: bool) -> str:
     )  # fmt: skip
     return environment.get_template("study.md.j2").render(
         arm=arm, is_studys=is_studys, t3=t3, t4=t4, sections=sections, figures=figures, network=network,
-        short=in_short(t3, sets, t4, torque, tracking), g=lambda x: f"{x:.3g}",
+        short=in_short(t3, sets, t4, torque, tracking, is_studys), g=lambda x: f"{x:.3g}",
         verdicts={v: count[v] for v in VERDICTS if count[v]},
         table1=tables_1_2_arm.table1(arm), table2=tables_1_2_arm.table2(arm),
         seeds=len(sets["sets"]["PSO"]), parameters=parameters(sets), table4=table4(t4),
@@ -79,7 +79,7 @@ def other_arms(folder: pathlib.Path) -> list[dict[str, str]]:
     return found
 
 
-def in_short(t3: dict, sets: dict, t4: dict, torque: dict, tracking: dict) -> list[str]:
+def in_short(t3: dict, sets: dict, t4: dict, torque: dict, tracking: dict, is_studys: bool) -> list[str]:
     """The findings that a reader should leave with."""
     runs, table = sets["runs"], t4["table"][SHOWN]
     mean = lambda name, key: float(np.mean(runs[name][key]))  # noqa: E731
@@ -92,8 +92,9 @@ def in_short(t3: dict, sets: dict, t4: dict, torque: dict, tracking: dict) -> li
     swarm = min((r for r in torque["rows"] if "PSO" in r["name"]), key=lambda r: r["held_out_median"])
     told = by["Levenberg-Marquardt, box as prior"]
     seen = tracking["seen"]
+    first = "The published accuracy can be reached, and means little" if is_studys else "The error is the readings' own"
     return [
-        f"**The published accuracy can be reached, and means little.** Under readings of the text that stay open, the swarms "
+        f"**{first}.** Under readings of the text that stay open, the swarms "
         f"end with errors of {mean('PSO', 'com'):.2g} / {mean('PSO', 'inertia'):.2g} % (PSO) and "
         f"{mean('QPSO', 'com'):.2g} / {mean('QPSO', 'inertia'):.2g} % (QPSO); published: 2.94 / 4.66 and 0.43 / 0.76 %. Under "
         f"others PSO alone gets down to {pso['com']:.1g} %. The error follows from the box and the velocity limit.",
