@@ -14,8 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from irb140_jax.effects.left_over import LeftOver
 from irb140_jax.robot import Robot
-from irb140_jax.types import Joints, JointSamples, Samples
+from irb140_jax.types import Joints, JointSamples, Samples, Scalar
 
 
 class RigidBody(eqx.Module):
@@ -28,6 +29,8 @@ class RigidBody(eqx.Module):
         last_link: Torque per inertial parameter of the last link, shape (T, n, 10).
         by_q, by_qd: Derivatives of the torque by joint positions and velocities, shape (T, n, n), torque first.
         mass: Joint-space mass matrix, links only, shape (T, n, n).
+        tool: Position of the tool in the world [m], shape (T, 3).
+        tool_jacobian: Velocity of the tool per joint speed, world axes [m or 1], shape (T, n, 3).
     """
 
     by_gravity: Float[Array, "T n 3"]
@@ -37,6 +40,8 @@ class RigidBody(eqx.Module):
     by_q: Float[Array, "T n n"]
     by_qd: Float[Array, "T n n"]
     mass: Float[Array, "T n n"]
+    tool: Float[Array, "T 3"]
+    tool_jacobian: Float[Array, "T n 3"]
 
 
 class Motion(eqx.Module):
@@ -47,10 +52,11 @@ class Motion(eqx.Module):
         q, qd, qdd: Joint positions, velocities, accelerations, shape (T, n).
         load: Torque the transmissions carry: rigid body and all but friction [N m or N], shape (T, n).
         total: Torque the motors give: load and friction [N m or N], shape (T, n).
-        load_rate, load_curve: First and second time derivative of the load, shape (T, n).
+        carried: What the links alone would need on the motors' path: no rotors, stiff gears [N m or N], shape (T, n).
         total_rate: Time derivative of the total torque, shape (T, n).
         rigid: What the rigid body does along the motion.
         rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
+        recording: Number of the recording, from 0; below 0 for motion that the diagnosis did not see, shape ().
     """
 
     t: Samples
@@ -59,11 +65,11 @@ class Motion(eqx.Module):
     qdd: JointSamples
     load: JointSamples
     total: JointSamples
-    load_rate: JointSamples
-    load_curve: JointSamples
+    carried: JointSamples
     total_rate: JointSamples
     rigid: "RigidBody"
     rest_speed: Joints
+    recording: Scalar
 
     def direction(self) -> JointSamples:
         """sign(qd), rounded off where encoder noise hides the sign, shape (T, n)."""
@@ -79,6 +85,7 @@ class Scales(NamedTuple):
     low: np.ndarray  # lowest and highest position [rad or m]
     high: np.ndarray
     duration: float  # of the longest recording [s]
+    inertia: np.ndarray  # mean inertia of the links about each joint, without rotors [kg m^2 or kg]
 
 
 class Parameter(NamedTuple):
@@ -110,8 +117,11 @@ class AbstractEffect(abc.ABC):
         mjcf: How MJCF expresses it, all of it or a part (see `in_model`), or None.
         not_in_mjcf: What of it MJCF can't express and why, one sentence without its full stop; "" where nothing is.
         leans_on_inertials: Its torque is made of the rigid body's own, so it is known no better than the inertials.
+        transmission: It acts before or inside the transmission, no part of what the links need on the motors' path.
+        once: It happens once, in one recording; nothing of it can be predicted from the others.
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
         scouts: Its grid of shapes is looked for in the residual (see `scout`).
+        scanned: From how many shapes a scout picks the best: what chance has as many tries at.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
         steps: Whether it can be simulated forward in time all the same (see `memory` and `step`).
@@ -133,8 +143,11 @@ class AbstractEffect(abc.ABC):
     mjcf: ClassVar[str | None] = None
     not_in_mjcf: ClassVar[str] = "MJCF has no such torque"
     leans_on_inertials: ClassVar[bool] = False
+    transmission: ClassVar[bool] = False
+    once: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
     scouts: ClassVar[bool] = False
+    scanned: ClassVar[int] = 1
     own: ClassVar[tuple[int, ...]] = (-1,)
     history: ClassVar[str | None] = None
     steps: ClassVar[bool] = False
@@ -158,16 +171,27 @@ class AbstractEffect(abc.ABC):
         at = int(np.argmin(np.abs(values - best[0])))
         return np.geomspace(values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)], len(values))[:, None]
 
-    def scout(self, q: np.ndarray, residual: np.ndarray, scales: Scales, joints: np.ndarray) -> np.ndarray | None:
-        """Grid of shapes suggested by what is left at a joint, or None.
+    def scan(self, scales: Scales, joints: np.ndarray) -> np.ndarray:
+        """Many shapes to try one by one before the search, shape (points, shape parameters); none by default.
+
+        The grid of the search is then the one `around` the best of them.
+        """
+        del scales, joints
+        return np.zeros((0, 0))
+
+    def around(self, best: np.ndarray) -> np.ndarray:
+        """Grid around the best shape of a scan, as many points as `shapes` gives."""
+        raise NotImplementedError(f"{self.slug} has no scan")
+
+    def scout(self, left: LeftOver, scales: Scales, joints: np.ndarray) -> np.ndarray | None:
+        """Grid of shapes suggested by what is left in the recordings, or None.
 
         Args:
-            q: Positions of the joint [rad or m], shape (R,).
-            residual: Whitened residual there, shape (R,).
+            left: What is left at every joint, time and recording.
             scales: Sizes of the recordings.
             joints: The site.
         """
-        del q, residual, scales, joints
+        del left, scales, joints
         return None
 
     @abc.abstractmethod

@@ -23,6 +23,7 @@ class TorqueRipple(AbstractEffect):
     }
     needs = "slow motion through the whole range of the joint"
     scouts = True
+    scanned = 100
     not_in_mjcf = "it is left out: no joint torque of MJCF is periodic in position"
 
     def shapes(self, scales, joints):
@@ -37,7 +38,9 @@ class TorqueRipple(AbstractEffect):
         step = np.min(np.diff(values)) if len(values) > 1 else 0.1 * best[0]
         return np.maximum(best[0] + min(step, 0.2 * best[0]) * np.linspace(-1.0, 1.0, POINTS), 1e-6)[:, None]
 
-    def scout(self, q, residual, scales, joints):
+    def scout(self, left, scales, joints):
+        use = left.weight[:, joints[0]] > 0
+        q, residual = left.q[use, joints[0]], left.residual[use, joints[0]]
         span = self._span(scales, joints)
         step = 1.0 / (OVERSAMPLING * span)
         # As many cycles as the samples can resolve where the joint is fastest.

@@ -102,7 +102,7 @@ def problem(data: Data, noise: Noise, blocks: int = BLOCKS) -> tuple[Problem, Gr
     for c in data.candidates:
         shapes[c.slug, c.joints] = shapes.get((c.slug, c.joints), 0) + 1
     rare = np.array([
-        -np.log(sites) - np.log(shapes[c.slug, c.joints]) + (LOOSE_PRIOR if c.slug == "inertials" else 0.0)
+        -np.log(sites * shapes[c.slug, c.joints] * c.effect.scanned) + (LOOSE_PRIOR if c.slug == "inertials" else 0.0)
         for c in data.candidates
     ])  # fmt: skip
     log_prior = np.where([c.effect.ordinary for c in data.candidates], -np.log(2.0), rare)

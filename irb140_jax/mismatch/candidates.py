@@ -13,14 +13,17 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
-from irb140_jax import dynamics
+from irb140_jax import dynamics, kinematics
 from irb140_jax.effects import AbstractEffect, Motion, RigidBody, Scales
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.recordings.condition import Band, Conditioned
 from irb140_jax.robot import Robot, with_phi
+from irb140_jax.types import JointSamples
 
 CHUNK = 2048  # samples per compiled call: recordings of any length reuse one program
+RUN_IN = 128  # samples in which effects with memory forget how their chunk began
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,14 +101,14 @@ class Library:
         return out
 
 
-def library(robot: Robot, effects: Sequence[AbstractEffect], scales: Scales) -> Library:
-    """Lay out the candidates of all effects at all sites."""
+def library(robot: Robot, effects: Sequence[AbstractEffect], scales: Scales, *, scan: bool = False) -> Library:
+    """Lay out the candidates of all effects at all sites, with their grids or, to `scan`, with the shapes of a scan."""
     blocks, candidates, first = [], [], 0
     for effect in effects:
         sites = effect.sites(robot)
         if len(sites) == 0:
             continue
-        shapes = np.stack([effect.shapes(scales, joints) for joints in sites])
+        shapes = np.stack([(effect.scan if scan else effect.shapes)(scales, joints) for joints in sites])
         width = max(max(v) for v in effect.variants) + 1
         blocks.append((effect, sites, shapes, first))
         for s, joints in enumerate(sites):
@@ -121,8 +124,23 @@ def library(robot: Robot, effects: Sequence[AbstractEffect], scales: Scales) -> 
     return Library(robot, tuple(candidates), tuple(blocks), first)
 
 
-def scales_of(recordings: Sequence[Conditioned]) -> Scales:
-    """Sizes over a set of conditioned recordings."""
+def reshaped(lib: Library, shapes: Sequence[np.ndarray]) -> Library:
+    """The library with other shapes, (S, G, s) for each block; only values change, so nothing is compiled anew."""
+    blocks = tuple((*old[:2], new, old[3]) for old, new in zip(lib.blocks, shapes, strict=True))
+    candidates = []
+    for c in lib.candidates:
+        effect, sites, new, first = next(b for b in blocks if b[0] is c.effect)
+        site = next(i for i, joints in enumerate(sites) if tuple(joints) == c.joints)
+        width = max(max(v) for v in effect.variants) + 1
+        position = (int(c.columns[0]) - c.variant[0] - first) // width - site * new.shape[1]
+        candidates.append(dataclasses.replace(c, shape=new[site, position]))
+    return dataclasses.replace(lib, candidates=tuple(candidates), blocks=blocks)
+
+
+def scales_of(along: Sequence["Prepared"]) -> Scales:
+    """Sizes over a set of recordings."""
+    recordings = [r.recording for r in along]
+    inertia = np.concatenate([np.diagonal(r.rigid.mass, axis1=1, axis2=2) for r in along]).mean(axis=0)
     return Scales(
         speed=np.max([np.abs(r.qd).max(axis=0) for r in recordings], axis=0),
         rest_speed=np.max([r.rest_speed for r in recordings], axis=0),
@@ -130,10 +148,18 @@ def scales_of(recordings: Sequence[Conditioned]) -> Scales:
         low=np.min([r.q.min(axis=0) for r in recordings], axis=0),
         high=np.max([r.q.max(axis=0) for r in recordings], axis=0),
         duration=max(float(r.t[-1] - r.t[0]) for r in recordings),
+        inertia=np.maximum(inertia, 1e-12),
     )
 
 
-Loads = tuple[np.ndarray, np.ndarray]  # torque the transmissions carry and torque the motors give, each (T, n)
+class Loads(NamedTuple):
+    """Torques along a recording, each (T, n) [N m or N]; see `Motion`."""
+
+    load: np.ndarray
+    total: np.ndarray
+    carried: np.ndarray
+
+
 STEP = 1e-5  # of the differences behind sensitivities [rad, rad/s, m ...]: errors of 1e-9 beside 1e-10 of rounding
 
 
@@ -143,11 +169,13 @@ class Columns(NamedTuple):
     Attributes:
         Y: Rigid-body regressor, shape (T, n, 10 n).
         nominal: Torque of the nominal model [N m or N], shape (T, n).
+        motor_side: What of it the links don't feel: rotors and the model's own friction, shape (T, n).
         effects: Columns of all candidates where they aren't zero throughout, shape (T, entries): see `Library.entries`.
     """
 
     Y: np.ndarray
     nominal: np.ndarray
+    motor_side: np.ndarray
     effects: np.ndarray
 
 
@@ -158,12 +186,14 @@ class Prepared(NamedTuple):
         recording: T samples.
         Y: Regressor, shape (T, n, 10 n).
         nominal: Torque of the nominal model, shape (T, n).
+        motor_side: What of it the links don't feel, shape (T, n).
         rigid: Sensitivities, arrays of T samples.
     """
 
     recording: Conditioned
     Y: np.ndarray
     nominal: np.ndarray
+    motor_side: np.ndarray
     rigid: RigidBody
 
 
@@ -171,24 +201,29 @@ def prepared(robot: Robot, recording: Conditioned) -> Prepared:
     """Evaluate the rigid body along a recording."""
     q, qd, qdd = (jnp.asarray(x) for x in (recording.q, recording.qd, recording.qdd))
     Y = np.asarray(dynamics.regressor_batch(robot, q, qd, qdd))
-    parts = lambda r: (r.armature, r.damping, r.frictionloss, r.stiffness)  # noqa: E731
-    bare = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 4)
+    # Springs of the model pull at the link; rotors and friction are the motor's.
+    parts = lambda r: (r.armature, r.damping, r.frictionloss)  # noqa: E731
+    bare = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 3)
     torque = lambda r, *x: np.asarray(dynamics.inverse_dynamics_batch(r, *x))  # noqa: E731
     rest = torque(bare, q, qd, qdd)
-    weightless = eqx.tree_at(lambda r: r.gravity, bare, jnp.zeros(3))
+    weightless = eqx.tree_at(lambda r: (r.gravity, r.stiffness), bare, (jnp.zeros(3), jnp.zeros(robot.n)))
     still = (q, 0.0 * qd, 0.0 * qdd)
     by_gravity = np.stack(
-        [torque(eqx.tree_at(lambda r: r.gravity, bare, jnp.eye(3)[k]), *still) for k in range(3)], axis=-1
+        [torque(eqx.tree_at(lambda r: r.gravity, weightless, jnp.eye(3)[k]), *still) for k in range(3)], axis=-1
     )
     unit = jnp.eye(robot.n)
     by_q = np.stack([(torque(bare, q + STEP * e, qd, qdd) - rest) / STEP for e in unit], axis=-1)
     by_qd = np.stack([(torque(bare, q, qd + STEP * e, qdd) - rest) / STEP for e in unit], axis=-1)
     mass = np.stack([torque(weightless, q, 0.0 * qd, 0.0 * qdd + e) for e in unit], axis=-1)
     size = np.linalg.norm(np.asarray(robot.gravity))
-    arrays = (by_gravity, size, np.asarray(across(robot.gravity)), Y[..., -10:], by_q, by_qd, mass)
+    tool, tool_jacobian = (np.asarray(x) for x in _tool(robot, q))
+    sides = np.asarray(across(robot.gravity))
+    arrays = (by_gravity, size, sides, Y[..., -10:], by_q, by_qd, mass, tool, tool_jacobian)
     rigid = RigidBody(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
-    nominal = Y @ np.asarray(robot.phi).ravel() + np.asarray(robot.armature) * recording.qdd
-    return Prepared(recording, Y, nominal + _passive(robot, recording), rigid)
+    motor_side = np.asarray(robot.armature) * recording.qdd + _friction(robot, recording)
+    spring = np.asarray(robot.stiffness) * (recording.q - np.asarray(robot.springref))
+    nominal = Y @ np.asarray(robot.phi).ravel() + motor_side + spring
+    return Prepared(recording, Y, nominal, motor_side, rigid)
 
 
 def with_inertials(along: Prepared, robot: Robot, phi: np.ndarray) -> Prepared:
@@ -196,24 +231,33 @@ def with_inertials(along: Prepared, robot: Robot, phi: np.ndarray) -> Prepared:
     return along._replace(rigid=prepared(with_phi(robot, jnp.asarray(phi)), along.recording).rigid)
 
 
-def columns_along(lib: Library, along: Prepared, loads: Loads | None = None) -> Columns:
+@eqx.filter_jit
+def _tool(robot: Robot, q: JointSamples) -> tuple[Float[Array, "T 3"], Float[Array, "T n 3"]]:
+    """Position of the tool in the world and its velocity per joint speed."""
+    place = lambda x: kinematics.forward_kinematics(robot, x)[:3, 3]  # noqa: E731
+    velocity = lambda x: kinematics.jacobian(robot, x)[:3].T  # noqa: E731
+    return jax.vmap(place)(q), jax.vmap(velocity)(q)
+
+
+def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, recording: int = -1) -> Columns:
     """Rigid-body regressor, nominal torque and all candidate columns along a recording.
 
     Args:
         lib: The library.
         along: The recording.
         loads: Loads along the recording [N m or N]; the nominal model's where None.
+        recording: Its number; below 0 where the diagnosis did not see it.
     """
     r = along.recording
-    load, total = loads or (along.nominal, along.nominal)
+    load, total, carried = loads or (along.nominal, along.nominal, along.nominal - along.motor_side)
     dt = float(np.mean(np.diff(r.t)))
-    rate = lambda x: np.gradient(x, dt, axis=0)  # noqa: E731
-    rates = (rate(load), rate(rate(load)), rate(total))
-    arrays = (r.t - r.t[0], r.q, r.qd, r.qdd, load, total, *rates, along.rigid, r.rest_speed)
-    whole = Motion(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
+    rate = np.gradient(total, dt, axis=0)
+    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, rate)
+    which = np.array(float(recording))
+    whole = Motion(*moving, along.rigid, r.rest_speed, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
     per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)
     parts = []
-    for start in range(0, len(r.t), CHUNK):
+    for start in range(0, len(r.t), CHUNK - RUN_IN):
         pad = max(start + CHUNK - len(r.t), 0)
 
         def piece(x, of_time, start=start, pad=pad):
@@ -224,8 +268,10 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None) -> 
         motion = jax.tree.map(piece, whole, per_sample)
         sites, shapes = [b[1] for b in lib.blocks], [b[2] for b in lib.blocks]
         effects = _columns(tuple(b[0] for b in lib.blocks), motion, sites, shapes)
-        parts.append(np.asarray(effects)[: CHUNK - pad])
-    return Columns(along.Y, along.nominal, np.concatenate(parts))
+        parts.append(np.asarray(effects)[RUN_IN if start else 0 : CHUNK - pad])
+        if pad:
+            break
+    return Columns(along.Y, along.nominal, along.motor_side, np.concatenate(parts))
 
 
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
@@ -241,10 +287,9 @@ def _columns(effects, motion, sites, shapes):
     return jnp.concatenate(rows, axis=-1)
 
 
-def _passive(robot: Robot, r: Conditioned) -> np.ndarray:
-    """The model's own friction and springs, with the sign of qd rounded off as in the candidates."""
-    dry = np.asarray(robot.frictionloss) * np.tanh(r.qd / r.rest_speed)
-    return np.asarray(robot.damping) * r.qd + dry + np.asarray(robot.stiffness) * (r.q - np.asarray(robot.springref))
+def _friction(robot: Robot, r: Conditioned) -> np.ndarray:
+    """The model's own friction, with the sign of qd rounded off as in the candidates."""
+    return np.asarray(robot.damping) * r.qd + np.asarray(robot.frictionloss) * np.tanh(r.qd / r.rest_speed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -254,16 +299,19 @@ class Stretch:
     Attributes:
         recording: Index of the recording it belongs to.
         t: Time of the rows [s], shape (R,).
+        begin: Time at which the recording begins [s].
         X: Columns [regressor | candidates] per joint, each (R, 10 n + size).
         y: Logged minus nominal torque per joint, (R, n).
         tau: Logged torque, low-passed, (R, n).
         nominal: Nominal torque, low-passed, (R, n).
         use: Rows in which the joint moves and nothing is lost, (R, n).
         q, qd, qdd: Motion at the rows, (R, n), for maps and the flexible competitor.
+        tool, tool_jacobian: Where the tool is and how joints move it, (R, 3) and (R, n, 3); see `RigidBody`.
     """
 
     recording: int
     t: np.ndarray
+    begin: float
     X: np.ndarray
     y: np.ndarray
     tau: np.ndarray
@@ -272,16 +320,19 @@ class Stretch:
     q: np.ndarray
     qd: np.ndarray
     qdd: np.ndarray
+    tool: np.ndarray
+    tool_jacobian: np.ndarray
 
 
 def stretch(lib: Library, along: Prepared, index: int, band: Band, loads: Loads | None = None) -> Stretch:
     """All columns of a recording through the common low-pass, at the kept samples."""
-    Y, nominal, columns = columns_along(lib, along, loads)
+    Y, nominal, _, columns = columns_along(lib, along, loads, index)
     recording = along.recording
     kept = band.kept(len(recording.t))
     nominal, tau = band.apply(nominal), band.apply(recording.tau)
     X = np.concatenate([band.apply(Y), lib.spread(band.apply(columns))], axis=-1)
     return Stretch(
-        index, recording.t[kept], X, tau - nominal, tau, nominal, recording.usable[kept],
+        index, recording.t[kept], recording.began, X, tau - nominal, tau, nominal, recording.usable[kept],
         recording.q[kept], recording.qd[kept], recording.qdd[kept],
+        np.asarray(along.rigid.tool)[kept], np.asarray(along.rigid.tool_jacobian)[kept],
     )  # fmt: skip

@@ -167,9 +167,10 @@ class CorrectedRobot(AbstractPlant):
 
         return jax.lax.fori_loop(0, NEWTON_STEPS, step, jnp.zeros_like(q))
 
-    def summed(self, motion: Motion, base: JointSamples, stepped) -> tuple[JointSamples, JointSamples, JointSamples]:
-        """What the transmissions carry, what the motors give and what is logged (see `model.Torques`)."""
+    def summed(self, motion: Motion, base: JointSamples, stepped) -> tuple[JointSamples, ...]:
+        """Load, carried and total torque, and what is logged (see `model.Torques`)."""
         friction, gain, load = jnp.zeros_like(base), jnp.zeros_like(base), base
+        inside = self.motor_side(motion.qd, motion.qdd)
         for k, a in enumerate(self.effects):
             rows = jnp.arange(self.n) if a.effect.everywhere else jnp.array(a.joints)
             given = None if stepped is None else stepped[k]
@@ -181,13 +182,17 @@ class CorrectedRobot(AbstractPlant):
                 friction += part
             else:
                 load += part
-        return load, load + friction, load + friction + gain
+                inside += part if a.effect.transmission else 0.0
+        return load, load - inside, load + friction, load + friction + gain
 
     def own_torque(self, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> JointSamples:
         """Rotors, friction and springs of the model as given."""
+        return self.motor_side(qd, qdd) + self.nominal.stiffness * (q - self.nominal.springref)
+
+    def motor_side(self, qd: JointSamples, qdd: JointSamples) -> JointSamples:
+        """Rotors and friction of the model as given, which the links don't feel."""
         r = self.nominal
-        dry = r.frictionloss * jnp.tanh(qd / self.rest_speed)
-        return r.armature * qdd + r.damping * qd + dry + r.stiffness * (q - r.springref)
+        return r.armature * qdd + r.damping * qd + r.frictionloss * jnp.tanh(qd / self.rest_speed)
 
 
 @eqx.filter_jit
@@ -211,14 +216,14 @@ def _torque(
     sensed = Sensitivities(robot.robot, robot.ahead, q, qd, qdd)
 
     def summed(_, torques):
-        load, total, _ = torques
-        loads = (load, total, rate(load), rate(rate(load)), rate(total))
+        load, carried, total, _ = torques
         rigid = cast(RigidBody, sensed)  # it has the same names, and derives what is asked for
-        motion = Motion(since, q, qd, qdd, *loads, rigid, robot.rest_speed)
+        new = jnp.array(-1.0)  # no recording of the diagnosis
+        motion = Motion(since, q, qd, qdd, load, total, carried, rate(total), rigid, robot.rest_speed, new)
         return robot.summed(motion, base, stepped)
 
     # Twice, as in the fit: columns that depend on the load see the corrected one the second time.
-    return jax.lax.fori_loop(0, 2, summed, (load, load, load))[2]
+    return jax.lax.fori_loop(0, 2, summed, (load, load - robot.motor_side(qd, qdd), load, load))[3]
 
 
 def corrected_robot(model: CorrectedModel) -> CorrectedRobot:

@@ -15,6 +15,7 @@ from irb140_jax.mismatch.candidates import (
     columns_along,
     library,
     prepared,
+    reshaped,
     scales_of,
     stretch,
     with_inertials,
@@ -24,6 +25,7 @@ from irb140_jax.mismatch.model import composed
 from irb140_jax.mismatch.name import Problem, search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
+from irb140_jax.mismatch.scout import left_over, scouted, suggested
 from irb140_jax.recordings.condition import Band, Conditioned
 from irb140_jax.robot import Robot
 
@@ -82,10 +84,10 @@ def explain(
         progress: Told what is being done.
     """
     factor = inertial_prior_factor(robot, 1.0)
-    scales = scales_of(recordings)
-    lib = library(robot, effects, scales)
     progress("rigid body along the recordings")
     along = [prepared(robot, r) for r in recordings]
+    scales = scales_of(along)
+    lib = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     loads: list[Loads | None] = [None] * len(recordings)
     chosen: tuple[int, ...] = ()
     ex: Explanation | None = None
@@ -99,7 +101,7 @@ def explain(
             post = full_posterior(data, ex.problem, ex.grams, ex.chosen)
             phi = np.asarray(robot.phi) + fitted(data, post, ex.chosen, factor)[0].reshape(-1, 10)
             along = [with_inertials(r, robot, phi) for r in along]
-            loads = [_loads(lib, data, post, ex.chosen, factor, r) for r in along]
+            loads = [_loads(lib, data, post, ex.chosen, factor, r, i) for i, r in enumerate(along)]
             lib, chosen = _refined(lib, ex, scales)
     assert ex is not None, "PASSES is at least one"
     return ex
@@ -133,11 +135,13 @@ def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -
     return noise_from_residuals(residuals, [s.use for s in data.stretches], np.full(n, used / n))
 
 
-def _loads(lib: Library, data: Data, post: Posterior, chosen, factor: np.ndarray, r: Prepared) -> Loads:
+def _loads(
+    lib: Library, data: Data, post: Posterior, chosen, factor: np.ndarray, r: Prepared, index: int
+) -> Loads:
     """Loads of the explained model along a recording."""
     dphi, members, amplitudes = fitted(data, post, chosen, factor)
-    torques = composed(lib, columns_along(lib, r), members, amplitudes, dphi, dphi)
-    return torques.load, torques.total
+    torques = composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi)
+    return Loads(torques.load, torques.total, torques.carried)
 
 
 def fitted(
@@ -159,43 +163,20 @@ def fitted(
 
 
 def _refined(lib: Library, ex: Explanation, scales: Scales) -> tuple[Library, tuple[int, ...]]:
-    """Finer grids of shapes around the chosen ones, and grids that the residual suggests.
-
-    Only values change, so that nothing is compiled anew.
-    """
-    members = ex.members
-    blocks = []
-    for effect, sites, shapes, first in lib.blocks:
-        shapes = shapes.copy()
+    """Finer grids of shapes around the chosen ones, and grids that the residual suggests."""
+    left = left_over(ex.data, ex.columns(), ex.noise.total)
+    shapes = []
+    for effect, sites, old, _ in lib.blocks:
+        new = old.copy()
         for s, joints in enumerate(sites):
-            mine = [m for m in members if m.slug == effect.slug and m.joints == tuple(joints)]
+            mine = [m for m in ex.members if m.slug == effect.slug and m.joints == tuple(joints)]
             if mine and effect.refines():
-                shapes[s] = effect.finer(shapes[s], mine[0].shape)
+                new[s] = effect.finer(old[s], mine[0].shape)
             elif effect.scouts and not mine:
-                suggested = effect.scout(*_left_over(ex, int(joints[0])), scales, joints)
-                shapes[s] = shapes[s] if suggested is None else suggested
-        blocks.append((effect, sites, shapes, first))
-    candidates = []
-    for c in lib.candidates:
-        block = next(b for b in blocks if b[0] is c.effect)
-        site = next(i for i, joints in enumerate(block[1]) if tuple(joints) == c.joints)
-        width = max(max(v) for v in c.effect.variants) + 1
-        position = (int(c.columns[0]) - c.variant[0] - block[3]) // width - site * block[2].shape[1]
-        candidates.append(dataclasses.replace(c, shape=block[2][site, position]))
-    refined = dataclasses.replace(lib, candidates=tuple(candidates), blocks=tuple(blocks))
+                new[s] = suggested(effect, left, scales, joints, old[s])
+        shapes.append(new)
+    refined = reshaped(lib, shapes)
     return refined, tuple(_same(c, refined, ex.data) for c in ex.chosen)
-
-
-def _left_over(ex: Explanation, joint: int) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of a joint and the residual there, in standard deviations, over all recordings."""
-    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
-    w = post.mean * ex.data.scale[post.columns]
-    q, residual = [], []
-    for r, s in enumerate(ex.data.stretches):
-        use = s.use[:, joint]
-        q.append(s.q[use, joint])
-        residual.append((s.y[use, joint] - s.X[use, joint][:, post.columns] @ w) / ex.noise.total[r, joint])
-    return np.concatenate(q), np.concatenate(residual)
 
 
 def _same(index: int, lib: Library, data: Data) -> int:

@@ -10,7 +10,15 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.candidates import Candidate, Columns, Library, columns_along, prepared, with_inertials
+from irb140_jax.mismatch.candidates import (
+    Candidate,
+    Columns,
+    Library,
+    Loads,
+    columns_along,
+    prepared,
+    with_inertials,
+)
 from irb140_jax.recordings.condition import Band, Conditioned, condition
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
@@ -49,6 +57,7 @@ class Torques:
         nominal: Of the model as given.
         refit: Of the rigid body with refitted inertials.
         load: What the transmissions carry: corrected rigid body and all effects but friction and gain.
+        carried: What of the load the links alone would need on the motors' path.
         total: Load and friction: what the motors really give.
         corrected: What the controller logs: total and the wrong torque constants.
     """
@@ -56,6 +65,7 @@ class Torques:
     nominal: np.ndarray
     refit: np.ndarray
     load: np.ndarray
+    carried: np.ndarray
     total: np.ndarray
     corrected: np.ndarray
 
@@ -98,7 +108,7 @@ def composed(
         amplitudes: Amplitudes of each.
         dphi_refit, dphi_corrected: Shift of the inertial parameters in either model, shape (10 n,).
     """
-    Y, nominal, columns = along
+    Y, nominal, inside, columns = along
     load = nominal + Y @ dphi_corrected
     friction, gain = np.zeros_like(load), np.zeros_like(load)
     for c, w in zip(candidates, amplitudes, strict=True):
@@ -109,8 +119,9 @@ def composed(
             friction += part
         else:
             load = load + part
+            inside = inside + part if c.effect.transmission else inside
     total = load + friction
-    return Torques(nominal, nominal + Y @ dphi_refit, load, total, total + gain)
+    return Torques(nominal, nominal + Y @ dphi_refit, load, load - inside, total, total + gain)
 
 
 def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
@@ -133,7 +144,8 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     if not model.named:
         return torques
     # Columns that depend on the load see the corrected one, as they did in the fit.
-    return composed(lib, columns_along(lib, along, (torques.load, torques.total)), candidates, amplitudes, *shifts)
+    loads = Loads(torques.load, torques.total, torques.carried)
+    return composed(lib, columns_along(lib, along, loads), candidates, amplitudes, *shifts)
 
 
 def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray]:

@@ -68,12 +68,16 @@ def refit_problem(ex: Explanation) -> tuple[Grams, np.ndarray]:
 
 def held_out(ex: Explanation, refit_grams: Grams, refit_columns: np.ndarray) -> HeldOut:
     """Residuals of the rival models, each row predicted from the other recordings (or blocks)."""
-    data = ex.data
+    data, once = ex.data, _happening_once(ex, ex.chosen)
+    seen = full_posterior(data, ex.problem, ex.grams, ex.chosen).mean
     out = {name: [s.y.copy() for s in data.stretches] for name in ("refit", "corrected")}
     for fold in folds(ex.grams):
         fits = {
             "refit": (refit_columns, posterior(refit_grams.total(fold), refit_columns).mean),
-            "corrected": (ex.columns(), full_posterior(data, ex.problem, ex.grams, ex.chosen, fold).mean),
+            "corrected": (
+                ex.columns(),
+                np.where(once, seen, full_posterior(data, ex.problem, ex.grams, ex.chosen, fold).mean),
+            ),
         }
         for r, s in enumerate(data.stretches):
             mine = fold[ex.grams.recording == s.recording]
@@ -93,11 +97,18 @@ def unseen_error(ex: Explanation, chosen: tuple[int, ...]) -> float:
     columns = ex.columns(chosen)
     index = np.concatenate([columns, [H.shape[1] - 1]])
     own = dataclasses.replace(ex.grams, blocks=H[:, index[:, None], index[None, :]])
-    every = np.arange(len(columns))
+    every, once = np.arange(len(columns)), _happening_once(ex, chosen)
+    seen = posterior(own.total(), every).mean
     for fold in folds(ex.grams):
-        w = np.concatenate([posterior(own.total(fold), every).mean, [-1.0]])
+        w = np.append(np.where(once, seen, posterior(own.total(fold), every).mean), -1.0)
         error += float(w @ own.blocks[fold].sum(axis=0) @ w)
     return error
+
+
+def _happening_once(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:
+    """Which columns of a set belong to what happens once: no recording tells of another's, so all data may be used."""
+    parts = [np.full(len(c.columns), c.effect.once) for c in (ex.data.candidates[i] for i in chosen)]
+    return np.concatenate([np.zeros(ex.data.nuisances, dtype=bool), *parts])
 
 
 def held_out_gain(ex: Explanation, without: int) -> tuple[float, float]:

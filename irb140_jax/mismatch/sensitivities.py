@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from irb140_jax import kinematics
 from irb140_jax.dynamics.chain import Plan, chain
 from irb140_jax.dynamics.newton_euler import rigid_torque
 from irb140_jax.dynamics.regressor import regressor_blocks
@@ -60,12 +61,22 @@ class Sensitivities(eqx.Module):
     @property
     def by_q(self) -> Float[Array, "T n n"]:
         """Derivative of the torque by joint positions, torque first."""
-        return self._by(0)
+        return self._by(0) + jnp.diag(self.robot.stiffness)  # springs of the model pull at the link
 
     @property
     def by_qd(self) -> Float[Array, "T n n"]:
         """Derivative of the torque by joint velocities."""
         return self._by(1)
+
+    @property
+    def tool(self) -> Float[Array, "T 3"]:
+        """Position of the tool in the world."""
+        return jax.vmap(lambda q: kinematics.forward_kinematics(self.robot, q)[:3, 3])(self.q)
+
+    @property
+    def tool_jacobian(self) -> Float[Array, "T n 3"]:
+        """Velocity of the tool per joint speed, world axes."""
+        return jax.vmap(lambda q: kinematics.jacobian(self.robot, q)[:3].T)(self.q)
 
     @property
     def mass(self) -> Float[Array, "T n n"]:

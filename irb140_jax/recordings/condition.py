@@ -80,6 +80,7 @@ class Conditioned:
         usable: False where a joint rests (dry friction is undetermined there) or samples are missing, shape (T, n).
         rest_speed: Speed that encoder noise can't tell from rest, shape (n,).
         notes: Repairs, as sentences.
+        began: Time of the log's first row [s]; the smoother leaves out the first samples.
     """
 
     source: str
@@ -91,6 +92,7 @@ class Conditioned:
     usable: np.ndarray
     rest_speed: np.ndarray
     notes: tuple[str, ...]
+    began: float
 
 
 def choose_band(recordings: list[Recording], robot: Robot) -> Band:
@@ -201,7 +203,8 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     notes = list(recording.notes)
     if spikes:
         notes.append(f"{spikes} torque spikes were replaced by the median of their neighbours")
-    return Conditioned(recording.source, grid, q, qd, qdd, tau, ~resting & ~lost[:, None], rest_speed, tuple(notes))
+    usable, began = ~resting & ~lost[:, None], float(recording.t[0])
+    return Conditioned(recording.source, grid, q, qd, qdd, tau, usable, rest_speed, tuple(notes), began)
 
 
 def _without_noise(q: np.ndarray, density: np.ndarray, rate: float, h1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -64,6 +64,7 @@ def unchecked_recording(
     rows = np.arange(1, len(file_t) + 1)
     table, rows = repair.without_repeated_rows(table, rows, notes)
     table, rows = repair.without_missing_ends(table, used, rows, notes)
+    table = repair.with_coarse_times_spread(table, notes)
     check_times(table["t"], rows, path, notes)
     for kind in sorted(complete):
         # Velocities that are full of holes are worth less than those derived from q.

@@ -10,6 +10,8 @@ from irb140_jax.recordings.recording import Recording
 
 MAX_MISSING_SHARE = 0.01  # of a column's values; beyond it, interpolation would write a part of the measurement
 MAX_GAP_ROWS = 10  # rows; at usual rates 10 to 50 ms, well below the periods at which arms move
+LEAST_REPEATED = 0.2  # of the time stamps that repeat the one before; fewer are rows out of order, not a coarse clock
+LONGEST_TICK = 0.1  # s; within a longer one, motion can't be told from its spreading
 MAX_ENDS_SHARE = 0.05  # of the rows that may be cut off at either end because a channel started late
 SPIKE_NEIGHBOURS = 20.0  # a glitch stands out by this many times what the joint does from sample to sample
 SPIKE_ACCELERATION = 2e4  # rad/s^2 or m/s^2; no arm reaches it, so such a jump and return is the encoder's
@@ -42,6 +44,34 @@ def without_missing_ends(
     if lost:
         notes.append(f"{_count(lost, 'row')} at the ends, in which a channel holds no value, left out")
     return {name: values[first : last + 1] for name, values in table.items()}, rows[first : last + 1]
+
+
+def with_coarse_times_spread(table: Table, notes: list[str]) -> Table:
+    """Spread rows evenly where the clock's tick is longer than the time between rows, so that stamps repeat.
+
+    Rows between two ticks are spread between them, and the rate is taken as steady over half a second as long as no
+    row moves by more than a tick.
+    """
+    t = table["t"]
+    dt = np.diff(t)
+    if len(t) < 3 or not np.isfinite(t).all() or np.any(dt < 0) or np.mean(dt == 0) < LEAST_REPEATED:
+        return table
+    starts = np.concatenate([[0], np.flatnonzero(dt > 0) + 1])
+    tick = float(np.median(np.diff(t[starts]))) if len(starts) > 2 else np.inf
+    if tick > LONGEST_TICK:
+        return table
+    # The last tick holds as many rows a second as all before it.
+    rate = starts[-1] / (t[-1] - t[0])
+    end = t[-1] + (len(t) - starts[-1]) / rate
+    spread = np.interp(np.arange(len(t)), np.append(starts, len(t)), np.append(t[starts], end))
+    half = max(int(0.25 * rate), 1)
+    padded = np.pad(spread, half, mode="reflect", reflect_type="odd")
+    steady = np.convolve(padded, np.full(2 * half + 1, 1.0 / (2 * half + 1)), mode="valid")
+    near = np.abs(steady - spread) <= tick
+    even = steady if near.all() and np.all(np.diff(steady) > 0) else spread
+    notes.append(f"Time stamps repeat: the clock ticks every {1000 * tick:.3g} ms, the rows come every "
+                 f"{1000 / rate:.3g} ms; the rows were spread evenly over the ticks")
+    return table | {"t": even}
 
 
 def few_missing(values: np.ndarray) -> bool:

@@ -127,15 +127,16 @@ class ActuatorLag(Hidden):
         return self.on_joint(survey, self.parameters["time_constant"] * survey.rate_of(survey.tau[:, self.joint]))
 
     def begin(self, plant: Plant):
-        self._real: float | None = None
-        time_constant = self.parameters["time_constant"]
-        self._step = 1.0 - math.exp(-plant.dt / time_constant) if time_constant > 0.0 else 1.0
+        self._before: tuple[float, float] | None = None
+        # By the trapezoidal rule, so that it lags by the time constant whatever the engine's step.
+        self._step = plant.dt / (2.0 * self.parameters["time_constant"] + plant.dt)
 
     def act(self, plant: Plant):
         logged = plant.torque[self.joint]
-        before = logged if self._real is None else self._real
-        self._real = before + self._step * (logged - before) if self._step < 1.0 else logged
-        plant.torque[self.joint] = self._real
+        logged_before, real = self._before or (logged, logged)
+        real += self._step * (logged + logged_before - 2.0 * real)
+        self._before = (logged, real)
+        plant.torque[self.joint] = real
 
 
 class TimeDelay(Hidden):

@@ -1,0 +1,124 @@
+"""Backlash: a dead zone between motor and link; positions are the motor's."""
+
+import itertools
+
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+
+from irb140_jax.effects.base import AbstractEffect, Parameter
+
+CROSSINGS = (0.03, 0.3)  # s the link takes through the dead zone: less is not seen below 20 Hz, more is no gear
+RATIO = 1.12  # of neighbouring gaps in the first scan: a tenth more and the link hits the flank too late
+POINTS = 6  # gaps in the search, each with two flanks
+FLANKS = (0.8, 1.25)
+MODE = 35.0  # Hz of the link on a flank, to begin with: above what is compared, so it only times the blows
+LEAST_GIVE = 0.05  # of the gap, by which a flank gives way under the joint's usual torque, at most
+FLANK_DAMPING = 0.15  # of the link on a flank, relative to critical: blows die out within a few swings
+STEPS = 4  # of the simulation per sample
+
+
+class Backlash(AbstractEffect):
+    """q_link = q - u: the link flies through the gap until a springy flank stops it.
+
+    M d2u/dt2 + (d tau/dqd) du/dt + (d tau/dq) u = tau - flank(u), tau what the link would need on the motor's path and
+    flank(u) zero within +-gap/2.  u is simulated along the motion for a gap and a flank on the grid and scaled to a gap
+    of one; the amplitude is the gap, equal to that of the grid where the grid has the right one.
+    """
+
+    slug = "backlash"
+    title = "play between motor and link"
+    equation = "-(d tau/dq_j u + d tau/dqd_j du/dt + M_j d2u/dt2), the link free within |u| <= gap/2"
+    source = "Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38, 2002"
+    parameters = (Parameter("gap", "{q}", low=0.0), Parameter("flank_stiffness", "{tau}/{q}", low=0.0))
+    variants = ((0,),)
+    confused_with = {
+        "presliding_hysteresis": "reversals under different preload",
+        "joint_elasticity": "load reversals of several sizes: a gap is crossed whole, a spring bends in proportion",
+        "coulomb_friction": "reversals of the load without a reversal of the motion",
+        "time_delay": "slow reversals of the load",
+        "actuator_lag": "slow reversals of the load",
+    }
+    needs = "the load on this joint changing sign, slowly and quickly"
+    feigned = 0.06  # so does a flank at every step of an imperfect friction law
+    transmission = True
+    history = "flies from flank to flank, which takes a state of the link beside that of the motor"
+    not_in_mjcf = "it is left out: play takes a second joint, and the model another size"
+    everywhere = True
+    scanned = round(3.0 * np.log(CROSSINGS[1] / CROSSINGS[0]) / np.log(RATIO))
+
+    def shapes(self, scales, joints):
+        middle = self.scan(scales, joints)
+        return self.around(middle[len(middle) // 2])
+
+    def scan(self, scales, joints):
+        # Through the zone by a torque that grows at three times its size a second: gap = rate t^3 / (6 M).
+        torque, inertia, low, high = (
+            float(x[joints[0]]) for x in (scales.torque, scales.inertia, scales.low, scales.high)
+        )
+        # A link without inertia follows at once: then the way that the motor goes is the limit.
+        largest = max(min(0.5 * torque / inertia * CROSSINGS[1] ** 3, high - low), 1e-12)
+        gaps = largest * np.geomspace((CROSSINGS[0] / CROSSINGS[1]) ** 3, 1.0, self.scanned)
+        return np.stack([gaps, np.maximum(inertia * (2.0 * np.pi * MODE) ** 2, torque / (LEAST_GIVE * gaps))], axis=1)
+
+    def refines(self):
+        return True
+
+    def around(self, best, ratio=RATIO):
+        near = best[0] * np.geomspace(1.0 / ratio, ratio, POINTS)
+        return np.array(list(itertools.product(near, best[1] * np.array(FLANKS))))
+
+    def finer(self, grid, best):
+        gaps = np.unique(grid[:, 0])
+        return self.around(best, float(np.min(gaps[1:] / gaps[:-1])))
+
+    def columns(self, motion, joints, shape):
+        rigid, dt = motion.rigid, motion.t[1] - motion.t[0]
+        at = lambda x: jnp.take(x, joints, axis=2)[:, :, 0]  # noqa: E731
+        own = lambda x: jnp.take(at(x), joints, axis=1)[:, 0]  # noqa: E731
+        load = jnp.take(motion.carried, joints, axis=1)[:, 0]
+        u = _flight(load, own(rigid.mass), own(rigid.by_qd), own(rigid.by_q), 0.5 * shape[0], shape[1], dt) / shape[0]
+        # Differences hold the blows on the flanks as well.
+        held = jnp.concatenate([u[:1], u, u[-1:]])
+        rate, curve = (held[2:] - held[:-2]) / (2.0 * dt), (held[2:] - 2.0 * u + held[:-2]) / dt**2
+        u, rate, curve = (x[:, None] for x in (u, rate, curve))
+        return -(at(rigid.by_q) * u + at(rigid.by_qd) * rate + at(rigid.mass) * curve)[:, :, None]
+
+    def physical(self, w, shape):
+        return jnp.stack([w[0], shape[1]])
+
+    def amplitudes(self, values):
+        return np.array([values["gap"]]), np.array([values["gap"], values["flank_stiffness"]])
+
+    def lowest(self, robot, joints):
+        return np.zeros(1)
+
+    def where(self, names, values, units):
+        return f"{names}: wherever its load changes sign; a gap of {values['gap']:.3g} {units['gap']}"
+
+
+def _flight(load, mass, damping, spring, half, flank, dt):
+    """Displacement u (T,) of a link with springy flanks at +-half, beginning on the flank that the load presses on."""
+    h = dt / STEPS
+
+    def sample(state, now):
+        start, end, m, d, k = now
+
+        def step(i, state):
+            u, before = state
+            force = start + (end - start) * (i + 1.0) / STEPS
+            inertia = m / h**2
+            pull, stay = force + inertia * (2.0 * u - before) + d / h * u, inertia + d / h + k
+            free = pull / stay
+            touch = jnp.abs(free) > half
+            # Within the flank the step is solved again with its spring and damper.
+            drag = 2.0 * FLANK_DAMPING * jnp.sqrt(flank * m) / h
+            pressed = (pull + flank * half * jnp.sign(free) + drag * u) / (stay + flank + drag)
+            return jnp.where(touch, pressed, free), u
+
+        state = lax.fori_loop(0, STEPS, step, state, unroll=True)
+        return state, state[0]
+
+    u = half * jnp.sign(load[0]) + load[0] / (flank + spring[0])
+    ahead = jnp.concatenate([load[:1], load[:-1]])
+    return lax.scan(sample, (u, u), (ahead, load, mass, damping, spring))[1]

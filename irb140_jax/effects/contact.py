@@ -1,0 +1,141 @@
+"""Contact: the tool leans on something springy in its surroundings."""
+
+import jax.numpy as jnp
+import numpy as np
+from scipy import optimize
+
+from irb140_jax.effects.base import AbstractEffect, Parameter
+
+NORMALS = 128  # directions of the first scan, some 16 degrees apart
+SHARES = (0.02, 0.05, 0.1, 0.2, 0.35)  # of the samples behind the wall, in the first scan
+DEEPEST = 0.5  # share of the samples behind the wall; beyond it this is no contact but a spring
+STARTS = 3  # walls from which the first scan is refined
+TILT, SHIFT = 0.02, 0.005  # first steps of the grid around the best wall: [rad] and share of the tool's travel
+
+
+class Contact(AbstractEffect):
+    """tau = -J^T n k depth on the motors, depth = max(0, position - n . x_tool): a smooth wall that only pushes."""
+
+    slug = "contact"
+    title = "contact with the surroundings"
+    equation = "-J_tool(q)^T n k max(0, position - n . x_tool)"
+    source = "Hogan, Impedance control, ASME JDSMC 107, 1985; Haddadin, De Luca, Albu-Schaeffer, IEEE T-RO 33, 2017"
+    parameters = (
+        Parameter("stiffness", "N/m", low=0.0),
+        Parameter("normal_x", "1"),
+        Parameter("normal_y", "1"),
+        Parameter("normal_z", "1"),
+        Parameter("position", "m"),
+    )
+    variants = ((0,),)
+    confused_with = {
+        "external_wrench": "the same path again: a wall is there again, a push is not",
+        "gravity_spring": "the same joint positions with the tool elsewhere",
+        "position_dependent_friction": "the same stretch in both directions: friction changes sign, a wall does not",
+    }
+    needs = "tool paths that touch what stands around, and others that don't"
+    everywhere = True
+    not_in_mjcf = "it is left out: a wall is a geometry of its own, with a solver's softness for its stiffness"
+    scouts = True
+    scanned = NORMALS * len(SHARES)
+
+    def sites(self, robot):
+        return np.arange(robot.n)[None, :]
+
+    def shapes(self, scales, joints):
+        return self._around(np.array([0.0, 0.0, 1.0, 0.0]), TILT, SHIFT)
+
+    def refines(self):
+        return True
+
+    def finer(self, grid, best):
+        step = 0.5 * np.max(np.abs(grid - best), axis=0)
+        return self._around(best, max(float(step[:3].max()), 1e-4), max(float(step[3]), 1e-6))
+
+    @staticmethod
+    def _around(best, tilt, shift):
+        """The wall, tilted both ways about two axes, and moved in and out, shape (7, 4)."""
+        across = np.linalg.svd(best[None, :3])[2][1:]
+        normals = [best[:3] + tilt * s * a for a in across for s in (-1.0, 1.0)]
+        tilted = [np.append(n / np.linalg.norm(n), best[3]) for n in normals]
+        return np.array([best, *tilted, best + [0, 0, 0, shift], best - [0, 0, 0, shift]])
+
+    def scout(self, left, scales, joints):
+        travel = float(np.ptp(left.tool, axis=0).max())
+        if travel < 1e-6:
+            return None
+        walls = np.array([
+            np.append(n, np.quantile(left.tool @ n, share)) for n in _sphere(NORMALS) for share in SHARES
+        ])  # fmt: skip
+        gains = np.concatenate([_gain(left, part) for part in np.array_split(walls, NORMALS)])
+        found = [_climbed(left, walls[i], travel) for i in _apart(walls[:, :3], gains)]
+        best = found[int(np.argmax([_gain(left, wall[None])[0] for wall in found]))]
+        return self._around(best, TILT, SHIFT * travel)
+
+    def columns(self, motion, joints, shape):
+        return _wall(motion.rigid.tool, motion.rigid.tool_jacobian, shape, jnp)[..., None]
+
+    def physical(self, w, shape):
+        return jnp.concatenate([w, shape])
+
+    def amplitudes(self, values):
+        shape = [values[k] for k in ("normal_x", "normal_y", "normal_z", "position")]
+        return np.array([values["stiffness"]]), np.array(shape)
+
+    def lowest(self, robot, joints):
+        return np.zeros(1)
+
+    def where(self, names, values, units):
+        normal = ", ".join(f"{values[f'normal_{k}']:.2f}" for k in "xyz")
+        return (
+            f"{names}: where the tool is less than {values['position']:.3g} m along ({normal}) of the world; it is "
+            f"pushed back with {values['stiffness']:.3g} N/m"
+        )
+
+
+def _wall(tool, tool_jacobian, shape, xp):
+    """Torque per unit of stiffness, shape (T, n)."""
+    depth = xp.maximum(shape[3] - tool @ shape[:3], 0.0)
+    return -depth[:, None] * (tool_jacobian @ shape[:3])
+
+
+def _gain(left, walls):
+    """Log likelihood that each wall would gain, 0 where it would pull or where the tool is mostly behind it."""
+    columns = np.stack([_wall(left.tool, left.tool_jacobian, wall, np) for wall in walls])
+    gain, stiffness = left.gains(columns[..., None])
+    behind = np.mean(np.any(columns != 0.0, axis=2), axis=1)
+    return np.where((stiffness[:, 0] > 0.0) & (behind < DEEPEST), gain, 0.0)
+
+
+def _apart(normals, gains):
+    """The best few walls whose normals are at least 30 degrees apart: a robot of few joints feels several alike."""
+    chosen: list[int] = []
+    for i in np.argsort(-gains):
+        if gains[i] > 0.0 and all(normals[i] @ normals[j] < np.cos(np.pi / 6) for j in chosen):
+            chosen.append(int(i))
+        if len(chosen) == STARTS:
+            break
+    return chosen or [0]
+
+
+def _climbed(left, wall, travel):
+    """A short simplex search from a wall, over two turns about the middle of the tool's path and a shift."""
+    across, middle = np.linalg.svd(wall[None, :3])[2][1:], left.tool.mean(axis=0)
+
+    def turned(x):
+        n = wall[:3] + x[:2] @ across
+        n /= np.linalg.norm(n)
+        return np.append(n, wall[3] + (n - wall[:3]) @ middle + travel * x[2])
+
+    start = np.vstack([np.zeros(3), np.diag([0.15, 0.15, 0.03])])
+    found = optimize.minimize(lambda x: -_gain(left, turned(x)[None])[0], np.zeros(3), method="Nelder-Mead",
+                              options={"maxfev": 120, "initial_simplex": start})  # fmt: skip
+    return turned(found.x)
+
+
+def _sphere(points):
+    """Directions spread evenly over the sphere (Fibonacci), shape (points, 3)."""
+    k = np.arange(points) + 0.5
+    z, turn = 1.0 - 2.0 * k / points, np.pi * (1.0 + np.sqrt(5.0)) * k
+    r = np.sqrt(1.0 - z**2)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)

@@ -1,0 +1,109 @@
+"""External wrench: somebody or something pushes the tool for a while."""
+
+import itertools
+
+import jax.numpy as jnp
+import numpy as np
+from scipy import optimize
+
+from irb140_jax.effects.base import AbstractEffect, Parameter
+
+RISE = 0.05  # s in which a push begins and ends
+EDGES = 32  # instants per recording at which a push may begin or end in the first scan
+LONGEST = 0.4  # of a recording; what lasts longer is no event
+SHORTEST = 0.2  # s; what lasts less is a blow, or a misfit
+NEAR = (-1.0, 0.0, 1.0)  # grid around the best start and end, in steps
+STEP = 0.05  # s, first step of that grid
+
+
+class ExternalWrench(AbstractEffect):
+    """tau = -J^T f on the motors, while t0 < t < t1 of one recording: a constant force on the tool, in world axes."""
+
+    slug = "external_wrench"
+    title = "a push on the tool for a while"
+    equation = "-J_tool(q)^T f, t0 < t < t1"
+    source = "De Luca, Albu-Schaeffer, Haddadin, Hirzinger, IROS 2006; scan: Siegmund, Sequential Analysis, 1985"
+    parameters = (
+        Parameter("t0", "s"),
+        Parameter("t1", "s"),
+        Parameter("recording", "1", low=1.0),
+        Parameter("force_x", "N"),
+        Parameter("force_y", "N"),
+        Parameter("force_z", "N"),
+    )
+    variants = ((0, 1, 2),)
+    confused_with = {
+        "contact": "the same path again: a wall is there again, a push is not",
+        "payload": "the same path again, without the push",
+        "torque_offset": "the same path again, without the push",
+    }
+    needs = "nothing: a push leaves its trace whenever it comes"
+    once = True
+    own = (0, 1, 2)
+    not_in_mjcf = "it is left out: it happened once and is no part of the machine"
+    everywhere = True
+    scouts = True
+    scanned = EDGES**2
+
+    def sites(self, robot):
+        return np.arange(robot.n)[None, :]
+
+    def shapes(self, scales, joints):
+        starts = max(scales.duration, 1.0) * np.linspace(0.1, 0.8, len(NEAR) ** 2)
+        return np.stack([starts, starts + 0.1 * max(scales.duration, 1.0), np.ones_like(starts)], axis=1)
+
+    def refines(self):
+        return True
+
+    def finer(self, grid, best):
+        at = np.sort(np.unique(np.abs(grid[:, 0] - best[0])))
+        return self._around(best, 0.5 * (at[1] if len(at) > 1 else STEP))
+
+    @staticmethod
+    def _around(best, step):
+        at = np.array([best + step * np.array([a, b, 0.0]) for a, b in itertools.product(NEAR, NEAR)])
+        at[:, 1] = np.maximum(at[:, 1], at[:, 0] + SHORTEST)
+        return at
+
+    def scout(self, left, scales, joints):
+        best, gain = None, -np.inf
+        for recording in np.unique(left.recording):
+            rows = left.recording == recording
+            t, J = left.t[rows], left.tool_jacobian[rows]
+            edges = np.linspace(t[0], t[-1], EDGES)
+            spans = [s for s in itertools.combinations(edges, 2) if SHORTEST < s[1] - s[0] < LONGEST * (t[-1] - t[0])]
+            column = lambda span: -_window(t, span[0], span[1], np)[:, None, None] * J  # noqa: B023, E731
+            gains = left.gains(np.stack([column(s) for s in spans]), rows)[0]
+            start = spans[int(np.argmax(gains))]
+            # A short simplex search moves both ends off the coarse grid.
+            simplex = np.add(start, [[0, 0], [0.3, 0], [0, 0.3]])
+            at = optimize.minimize(
+                lambda s: -left.gains(column(s)[None], rows)[0][0] if s[1] > s[0] + SHORTEST else 0.0,  # noqa: B023
+                start, method="Nelder-Mead", options={"maxfev": 60, "initial_simplex": simplex},
+            )  # fmt: skip
+            if -at.fun > gain:
+                best, gain = np.array([*at.x, recording + 1.0]), -at.fun
+        return None if best is None else self._around(best, STEP)
+
+    def columns(self, motion, joints, shape):
+        here = jnp.where(motion.recording + 1.0 == shape[2], 1.0, 0.0)
+        return -here * _window(motion.t, shape[0], shape[1], jnp)[:, None, None] * motion.rigid.tool_jacobian
+
+    def physical(self, w, shape):
+        return jnp.concatenate([shape, w])
+
+    def amplitudes(self, values):
+        shape = [values[k] for k in ("t0", "t1", "recording")]
+        return np.array([values[f"force_{k}"] for k in "xyz"]), np.array(shape)
+
+    def where(self, names, values, units):
+        force = np.array([values[f"force_{k}"] for k in "xyz"])
+        return (
+            f"{names}: from {values['t0']:.3g} to {values['t1']:.3g} s of recording {values['recording']:.0f}, a force "
+            f"of {np.linalg.norm(force):.3g} N at the tool"
+        )
+
+
+def _window(t, t0, t1, xp):
+    """1 between t0 and t1, 0 outside, with soft edges, shape (T,)."""
+    return 0.5 * (xp.tanh((t - t0) / RISE) - xp.tanh((t - t1) / RISE))

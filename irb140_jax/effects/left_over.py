@@ -1,0 +1,70 @@
+"""What an explanation leaves of the recordings, for effects that look for their shape in it."""
+
+import dataclasses
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy import linalg
+
+
+@dataclasses.dataclass(frozen=True)
+class LeftOver:
+    """Rows of all recordings, and the columns whose amplitudes are still to be fitted beside anything new.
+
+    Attributes:
+        recording: Number of each row's recording, shape (R,).
+        t: Time since that recording began [s], shape (R,).
+        q: Joint positions [rad or m], shape (R, n).
+        tool: Position of the tool in the world [m], shape (R, 3).
+        tool_jacobian: Velocity of the tool per joint speed, shape (R, n, 3).
+        weight: One over the standard deviation of the noise; 0 for rows that don't count, shape (R, n).
+        y: Torque that the nominal model leaves, in standard deviations, shape (R, n).
+        known: Columns of what explains it so far, in standard deviations per prior unit, shape (R, n, k).
+    """
+
+    recording: Int[np.ndarray, " R"]
+    t: Float[np.ndarray, " R"]
+    q: Float[np.ndarray, "R n"]
+    tool: Float[np.ndarray, "R 3"]
+    tool_jacobian: Float[np.ndarray, "R n 3"]
+    weight: Float[np.ndarray, "R n"]
+    y: Float[np.ndarray, "R n"]
+    known: Float[np.ndarray, "R n k"]
+
+    @cached_property
+    def _half(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cholesky factor L of the known columns' posterior precision, and L^-1 known' y."""
+        B = self.known.reshape(-1, self.known.shape[-1])
+        half = linalg.cholesky(B.T @ B + np.eye(B.shape[1]), lower=True)
+        return half, linalg.solve_triangular(half, B.T @ self.y.ravel(), lower=True)
+
+    @cached_property
+    def residual(self) -> Float[np.ndarray, "R n"]:
+        """What is left once the known columns are fitted, in standard deviations, shape (R, n)."""
+        half, b = self._half
+        return self.y - self.known @ linalg.solve_triangular(half.T, b, lower=False)
+
+    def gains(
+        self, columns: Float[np.ndarray, "C S n k"], rows: Bool[np.ndarray, " R"] | None = None
+    ) -> tuple[Float[np.ndarray, " C"], Float[np.ndarray, "C k"]]:
+        """Log likelihood that each of C candidates would gain beside the known columns, and its amplitudes.
+
+        Args:
+            columns: Torque per unit of each amplitude [N m or N], shape (C, rows, n, k).
+            rows: Which rows those are, where the columns are zero in all others.
+        """
+        rows = np.ones(len(self.t), dtype=bool) if rows is None else rows
+        C, _, _, k = columns.shape
+        flat = (columns * self.weight[rows][..., None]).reshape(C, -1, k)
+        B, y = self.known[rows].reshape(-1, self.known.shape[-1]), self.y[rows].ravel()
+        half, b = self._half
+        stacked = flat.transpose(1, 0, 2).reshape(len(y), C * k)
+        shared = linalg.solve_triangular(half, B.T @ stacked, lower=True)
+        own = np.einsum("cri,crj->cij", flat, flat)
+        parts = shared.reshape(-1, C, k)
+        G = own - np.einsum("mci,mcj->cij", parts, parts)
+        g = (stacked.T @ y - shared.T @ b).reshape(C, k)
+        ridge = 1e-6 * np.trace(own, axis1=1, axis2=2)[:, None, None] * np.eye(k) + 1e-12 * np.eye(k)
+        w = np.linalg.solve(G + ridge, g[..., None])[..., 0]
+        return 0.5 * np.einsum("ci,ci->c", g, w), w

@@ -1,0 +1,94 @@
+"""Shapes that the recordings themselves suggest, for effects whose grid of shapes would be too large to search."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from irb140_jax.effects import AbstractEffect, LeftOver, Scales
+from irb140_jax.mismatch.assemble import Data, assemble
+from irb140_jax.mismatch.candidates import Library, Prepared, Stretch, library, reshaped, stretch
+from irb140_jax.recordings.condition import Band
+
+MOST_ROWS = 2000  # thinned to so many: shapes are found from what is large and slow
+
+
+def scouted(
+    lib: Library, along: Sequence[Prepared], band: Band, factor: np.ndarray, uncertainty: float, scales: Scales
+) -> Library:
+    """The library with shapes from what inertials and ordinary friction leave, before anything rarer is tried.
+
+    Without it, the first search would explain a push or a wall by whatever else is in the library.
+    """
+    effects = [block[0] for block in lib.blocks]
+    plain = library(lib.robot, [e for e in effects if e.ordinary], scales)
+    data = assemble(plain, [stretch(plain, r, i, band) for i, r in enumerate(along)], factor, uncertainty)
+    columns = np.arange(data.nuisances + plain.size)
+    noise = np.array([[_rms(s.y[s.use[:, j], j]) for j in range(lib.robot.n)] for s in data.stretches])
+    for _ in range(2):  # the first noise holds what friction explains
+        left = left_over(data, columns, noise)
+        size = [[_rms(left.residual[(left.recording == r) & (left.weight[:, j] > 0), j])
+                 for j in range(lib.robot.n)] for r in range(len(along))]  # fmt: skip
+        noise = noise * np.array(size)
+    left = left_over(data, columns, noise)
+    best = _scanned(lib, along, band, scales, left)
+    shapes = [
+        np.stack([
+            e.around(best[e.slug, tuple(joints)]) if (e.slug, tuple(joints)) in best
+            else suggested(e, left, scales, joints, old[s]) for s, joints in enumerate(sites)
+        ])
+        for e, sites, old, _ in lib.blocks
+    ]  # fmt: skip
+    return reshaped(lib, shapes)
+
+
+def _scanned(
+    lib: Library, along: Sequence[Prepared], band: Band, scales: Scales, left: LeftOver
+) -> dict[tuple[str, tuple[int, ...]], np.ndarray]:
+    """The best shape of each effect that has a scan, by effect and site."""
+    scanning = [e for e, sites, *_ in lib.blocks if len(e.scan(scales, sites[0]))]
+    many = library(lib.robot, scanning, scales, scan=True)
+    rows = [stretch(many, r, i, band) for i, r in enumerate(along)]
+    X = _thinned(rows, lambda s: s.X[..., 10 * lib.robot.n :])
+    best: dict[tuple[str, tuple[int, ...]], tuple[float, np.ndarray]] = {}
+    for c in many.candidates:
+        gain, w = left.gains(X[None][..., c.columns])
+        key, inside = (c.slug, c.joints), np.all((w[0] >= c.lowest) & (w[0] <= c.highest))
+        if inside and gain[0] > best.get(key, (0.0,))[0]:
+            best[key] = (float(gain[0]), c.shape)
+    return {key: shape for key, (_, shape) in best.items()}
+
+
+def _thinned(stretches: Sequence[Stretch], part: Callable[[Stretch], np.ndarray]) -> np.ndarray:
+    """An array of all recordings' rows, thinned to what scouts need."""
+    thin = max(1, sum(len(s.t) for s in stretches) // MOST_ROWS)
+    return np.concatenate([part(s)[::thin] for s in stretches])
+
+
+def suggested(
+    effect: AbstractEffect, left: LeftOver, scales: Scales, joints: np.ndarray, otherwise: np.ndarray
+) -> np.ndarray:
+    """The shapes that an effect finds in what is left, or else those it had."""
+    shapes = effect.scout(left, scales, joints) if effect.scouts else None
+    return otherwise if shapes is None else shapes
+
+
+def left_over(data: Data, columns: np.ndarray, noise: np.ndarray) -> LeftOver:
+    """What some columns leave of the recordings.
+
+    Args:
+        data: Rows of all recordings.
+        columns: Which columns explain them so far; their amplitudes stay free.
+        noise: Standard deviation of each joint's noise, shape (recordings, n) [N m or N].
+    """
+    join = lambda name: _thinned(data.stretches, lambda s: getattr(s, name))  # noqa: E731
+    recording = _thinned(data.stretches, lambda s: np.full(len(s.t), s.recording))
+    t = _thinned(data.stretches, lambda s: s.t - s.begin)
+    weight = np.where(join("use"), 1.0 / np.maximum(noise, 1e-9)[recording], 0.0)
+    X = _thinned(data.stretches, lambda s: s.X[..., columns]) * data.scale[columns]
+    return LeftOver(
+        recording, t, join("q"), join("tool"), join("tool_jacobian"), weight, join("y") * weight, X * weight[..., None]
+    )
+
+
+def _rms(x: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(x**2))) if len(x) else 1.0
