@@ -23,6 +23,7 @@ from irb140_jax.robot import Robot, with_phi
 from irb140_jax.types import JointSamples
 
 CHUNK = 2048  # samples per compiled call: recordings of any length reuse one program
+POSTURES = 50  # of each recording, for mean inertias
 RUN_IN = 128  # samples in which effects with memory forget how their chunk began
 
 
@@ -137,10 +138,10 @@ def reshaped(lib: Library, shapes: Sequence[np.ndarray]) -> Library:
     return dataclasses.replace(lib, candidates=tuple(candidates), blocks=blocks)
 
 
-def scales_of(along: Sequence["Prepared"]) -> Scales:
-    """Sizes over a set of recordings."""
-    recordings = [r.recording for r in along]
-    inertia = np.concatenate([np.diagonal(r.rigid.mass, axis1=1, axis2=2) for r in along]).mean(axis=0)
+def scales_of(recordings: Sequence[Conditioned], robot: Robot) -> Scales:
+    """Sizes over a set of conditioned recordings of a robot."""
+    q = np.concatenate([r.q[:: max(1, len(r.q) // POSTURES)] for r in recordings])
+    inertia = np.diagonal(_mass(robot, jnp.asarray(q)), axis1=1, axis2=2).mean(axis=0)
     return Scales(
         speed=np.max([np.abs(r.qd).max(axis=0) for r in recordings], axis=0),
         rest_speed=np.max([r.rest_speed for r in recordings], axis=0),
@@ -206,7 +207,7 @@ def prepared(robot: Robot, recording: Conditioned) -> Prepared:
     bare = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 3)
     torque = lambda r, *x: np.asarray(dynamics.inverse_dynamics_batch(r, *x))  # noqa: E731
     rest = torque(bare, q, qd, qdd)
-    weightless = eqx.tree_at(lambda r: (r.gravity, r.stiffness), bare, (jnp.zeros(3), jnp.zeros(robot.n)))
+    weightless = _weightless(robot)
     still = (q, 0.0 * qd, 0.0 * qdd)
     by_gravity = np.stack(
         [torque(eqx.tree_at(lambda r: r.gravity, weightless, jnp.eye(3)[k]), *still) for k in range(3)], axis=-1
@@ -214,7 +215,7 @@ def prepared(robot: Robot, recording: Conditioned) -> Prepared:
     unit = jnp.eye(robot.n)
     by_q = np.stack([(torque(bare, q + STEP * e, qd, qdd) - rest) / STEP for e in unit], axis=-1)
     by_qd = np.stack([(torque(bare, q, qd + STEP * e, qdd) - rest) / STEP for e in unit], axis=-1)
-    mass = np.stack([torque(weightless, q, 0.0 * qd, 0.0 * qdd + e) for e in unit], axis=-1)
+    mass = _mass(robot, q)
     size = np.linalg.norm(np.asarray(robot.gravity))
     tool, tool_jacobian = (np.asarray(x) for x in _tool(robot, q))
     sides = np.asarray(across(robot.gravity))
@@ -229,6 +230,22 @@ def prepared(robot: Robot, recording: Conditioned) -> Prepared:
 def with_inertials(along: Prepared, robot: Robot, phi: np.ndarray) -> Prepared:
     """The same with sensitivities at other inertial parameters, shape (n, 10): those of a robot known better."""
     return along._replace(rigid=prepared(with_phi(robot, jnp.asarray(phi)), along.recording).rigid)
+
+
+def _weightless(robot: Robot) -> Robot:
+    """Links only, without gravity."""
+    none = jnp.zeros(robot.n)
+    parts = lambda r: (r.gravity, r.stiffness, r.armature, r.damping, r.frictionloss)  # noqa: E731
+    return eqx.tree_at(parts, robot, (jnp.zeros(3), *(none,) * 4))
+
+
+def _mass(robot: Robot, q: JointSamples) -> np.ndarray:
+    """Mass matrices of the links, shape (T, n, n)."""
+    links, still = _weightless(robot), jnp.zeros_like(q)
+    unit = jnp.eye(robot.n)
+    return np.stack(
+        [np.asarray(dynamics.inverse_dynamics_batch(links, q, still, still + e)) for e in unit], axis=-1
+    )
 
 
 @eqx.filter_jit

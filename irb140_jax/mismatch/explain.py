@@ -86,7 +86,7 @@ def explain(
     factor = inertial_prior_factor(robot, 1.0)
     progress("rigid body along the recordings")
     along = [prepared(robot, r) for r in recordings]
-    scales = scales_of(along)
+    scales = scales_of(recordings, robot)
     lib = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     loads: list[Loads | None] = [None] * len(recordings)
     chosen: tuple[int, ...] = ()

@@ -92,7 +92,7 @@ class Conditioned:
     usable: np.ndarray
     rest_speed: np.ndarray
     notes: tuple[str, ...]
-    began: float
+    began: float = 0.0
 
 
 def choose_band(recordings: list[Recording], robot: Robot) -> Band:
