@@ -41,6 +41,7 @@ class Backlash(AbstractEffect):
     }
     needs = "the load on this joint changing sign, slowly and quickly"
     feigned = 0.06  # so does a flank at every step of an imperfect friction law
+    leans_on_inertials = True
     transmission = True
     history = "flies from flank to flank, which takes a state of the link beside that of the motor"
     not_in_mjcf = "it is left out: play takes a second joint, and the model another size"
