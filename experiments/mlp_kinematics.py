@@ -252,10 +252,10 @@ def main() -> None:
     set_up_compilation_cache()
     rows = run(config)
     stem = "mlp_kinematics_smoke" if config.smoke else "mlp_kinematics"
-    (config.out / f"{stem}.json").write_text(json.dumps({"cases": rows}) + "\n", encoding="utf-8")
-    (config.out / f"{stem}.md").write_text(page(rows), encoding="utf-8")
+    (config.out / f"{stem}.json").write_text(json.dumps({"regions": REGIONS, "cases": rows}) + "\n", encoding="utf-8")
+    (config.out / f"{stem}.md").write_text(page(rows, REGIONS), encoding="utf-8")
     figure12(rows, config.figures)
-    print(page(rows))
+    print(page(rows, REGIONS))
 
 
 if __name__ == "__main__":
