@@ -133,6 +133,14 @@ def test_an_encoder_that_wraps_is_unwrapped_and_stated(sound, robot, tmp_path):
     assert "unwrapped" in " ".join(again.notes)
 
 
+def test_stamps_of_a_clock_slower_than_the_rows_are_spread_and_stated(sound, robot, tmp_path):
+    tick = 0.0156  # s, of an operating system; rows come every 4 ms
+    coarse = read(changed(sound, t=np.floor(sound.t / tick) * tick, qd=None), robot, tmp_path)
+    # A row is up to a tick older than its stamp; spread evenly, half of that is an offset of all.
+    assert np.ptp(coarse.t - sound.t) < 0.25 * tick and np.abs(coarse.t - sound.t).max() < tick
+    assert any("the clock ticks every 15.6 ms" in note for note in coarse.notes)
+
+
 def test_single_positions_out_of_line_are_replaced_and_stated(sound, robot, tmp_path):
     q = sound.q.copy()
     q[[300, 900], 1] += 1.5

@@ -1,5 +1,13 @@
 """Readers of real machines' published recordings: pure functions, no data."""
 
+from irb140_jax.recordings.machines.bam_xl330 import servo_model as servo_model
+from irb140_jax.recordings.machines.bam_xl330 import servo_recording as servo_recording
+from irb140_jax.recordings.machines.bam_xl330 import servo_runs as servo_runs
+from irb140_jax.recordings.machines.bam_xl330 import write_servo as write_servo
+from irb140_jax.recordings.machines.cycloidal_play import cycloidal_model as cycloidal_model
+from irb140_jax.recordings.machines.cycloidal_play import cycloidal_recording as cycloidal_recording
+from irb140_jax.recordings.machines.cycloidal_play import cycloidal_runs as cycloidal_runs
+from irb140_jax.recordings.machines.cycloidal_play import write_cycloidal as write_cycloidal
 from irb140_jax.recordings.machines.dfki_double_pendulum import pendulum_model as pendulum_model
 from irb140_jax.recordings.machines.dfki_double_pendulum import (
     pendulum_model_with_mistake as pendulum_model_with_mistake,

@@ -1,5 +1,6 @@
 """Where the published recordings come from: repository, commit, path and SHA-256 of every file that is read here."""
 
+import urllib.parse
 from typing import NamedTuple
 
 
@@ -20,7 +21,8 @@ class Source(NamedTuple):
 
     def url(self, name: str) -> str:
         """Address of a file at the pinned commit."""
-        return f"https://raw.githubusercontent.com/{self.repository}/{self.commit}/{self.files[name][0]}"
+        path = urllib.parse.quote(self.files[name][0])
+        return f"https://raw.githubusercontent.com/{self.repository}/{self.commit}/{path}"
 
 
 SOURCES = {
@@ -135,6 +137,120 @@ SOURCES = {
             "design_A.0/model_2.1_pendubot.urdf": (
                 "data/system_identification/identified_parameters/design_A.0/model_2.1/pendubot.urdf",
                 "e1a31f98fde4e5391f5d136dbfb112f105e5813d7cd233383c69e72033056d51",
+            ),
+        },
+    ),
+    "cycloidal_play": Source(
+        "JelmerV/Anti-Backlash-Cycloidal-Actuator", "a5fe58d41bdcc9a72f28b00e12de10c8ebd178c3", "CC-BY-SA-4.0",
+        {
+            "2024-07-17__15-49-43__torqueramp__base_onyx init1.csv": (
+                "Code/test_data/2024-07-17__15-49-43__torqueramp__base_onyx init1.csv",
+                "25ee896c6eb3e7c77280420d808df7561b698223ed5e3c70c7f280978c34202d",
+            ),
+            "2024-07-18__10-58-26__torqueramp__base_onyx runin1.csv": (
+                "Code/test_data/2024-07-18__10-58-26__torqueramp__base_onyx runin1.csv",
+                "75b9be6d748349a8ead0122f08d8dae161719978cdd947cd62a7e580ab82292c",
+            ),
+            "2024-07-18__11-02-28__torqueramp__base_onyx runin5.csv": (
+                "Code/test_data/2024-07-18__11-02-28__torqueramp__base_onyx runin5.csv",
+                "facd8517eacdb02eb4f8f2841c44793cd2e3d5c97c1033705c0a3a2ca52f9c2a",
+            ),
+            "2024-07-18__11-17-26__torqueramp__base_onyx runin6.csv": (
+                "Code/test_data/2024-07-18__11-17-26__torqueramp__base_onyx runin6.csv",
+                "7f5f6a350ca47d6df95a3a1aa8632b61204d71d08ec1bce1333794dc96141501",
+            ),
+            "2024-07-18__16-28-57__torqueramp__split_onyx runin1.csv": (
+                "Code/test_data/2024-07-18__16-28-57__torqueramp__split_onyx runin1.csv",
+                "44f3ff487e54d8891d6fab0f6050baab5549a86e633eb5b2434c6aa3e0963337",
+            ),
+            "2024-07-18__16-32-24__torqueramp__split_onyx runin5.csv": (
+                "Code/test_data/2024-07-18__16-32-24__torqueramp__split_onyx runin5.csv",
+                "c3c4407c9d817646d9224939e7d4aed6cb45bba6a82dea2f9e55507a6c8ccc15",
+            ),
+            "2024-07-18__17-36-03__torqueramp__split_onyx 3pre1.csv": (
+                "Code/test_data/2024-07-18__17-36-03__torqueramp__split_onyx 3pre1.csv",
+                "556a0c90ea5029537fc88e3f86666e27bf2493f0ab9d6165ee6a9f96f1c1871a",
+            ),
+            "2024-07-18__18-30-11__torqueramp__split_onyx 6pre1.csv": (
+                "Code/test_data/2024-07-18__18-30-11__torqueramp__split_onyx 6pre1.csv",
+                "8f2c74045f855c84c2e664e05be9e4d6aeb3bfdbe9fde0d020ae4575a285ae72",
+            ),
+            "2024-07-19__12-45-43__torqueramp__split_onyx 12pre1.csv": (
+                "Code/test_data/2024-07-19__12-45-43__torqueramp__split_onyx 12pre1.csv",
+                "9b9e4b59b01ca91f36d3aa4ad590e3d145d132d8808558e252b915c79ce8bf6e",
+            ),
+            "2024-07-19__12-49-55__torqueramp__split_onyx 12pre5.csv": (
+                "Code/test_data/2024-07-19__12-49-55__torqueramp__split_onyx 12pre5.csv",
+                "3ae5d7d390291f3ff3ce999e83fb0e521532bf615967a2c028cb9ba2d953d3c6",
+            ),
+        },
+    ),
+    "bam_xl330": Source(
+        "Rhoban/bam", "af2260462471ff45ac18af159b1327ea51d8db15", "Apache-2.0",
+        {
+            "2026-01-15_10h28m10.json": (
+                "bam/data.bak/raw/2026-01-15_10h28m10.json",
+                "e58f3c2a08a5e0e37a2c5e930d0830a438bc102b8d21482767124f495b92f2ce",
+            ),
+            "2026-01-15_10h28m17.json": (
+                "bam/data.bak/raw/2026-01-15_10h28m17.json",
+                "ef6507934ba465eb31529d7d98715ecc70bd5c87be049fd4618a94ce39290569",
+            ),
+            "2026-01-15_10h28m24.json": (
+                "bam/data.bak/raw/2026-01-15_10h28m24.json",
+                "165b171df12b3e8b39504ce36d37e373ad105c0dddf4d3d073c747fd492e8bef",
+            ),
+            "2026-01-15_10h28m32.json": (
+                "bam/data.bak/raw/2026-01-15_10h28m32.json",
+                "fdc255edae6995298af437f37582eb8cd0c4a5ddcec4f49fb7c4d6f3303aaa9c",
+            ),
+            "2026-01-15_10h28m42.json": (
+                "bam/data.bak/raw/2026-01-15_10h28m42.json",
+                "1c6386bfa3be021c8ca8a96a7cbee93914f6271a050282b1c3b7d5ef373427db",
+            ),
+            "2026-01-15_10h28m49.json": (
+                "bam/data.bak/raw/2026-01-15_10h28m49.json",
+                "e2223826274fca7799a2be0cb371e4269ead88cd9077fbb68498ef93e4e0de97",
+            ),
+            "2026-01-15_10h28m57.json": (
+                "bam/data.bak/raw/2026-01-15_10h28m57.json",
+                "c10a350d9c7222d4d3499d140edd3ac4e63fe94f3b59a675116a34db7d66152c",
+            ),
+            "2026-01-15_10h29m04.json": (
+                "bam/data.bak/raw/2026-01-15_10h29m04.json",
+                "7996c43314a9f60094a6119346b54ff9ff84cb6726c967f4a88a7175278f6515",
+            ),
+            "2026-01-15_10h29m14.json": (
+                "bam/data.bak/raw/2026-01-15_10h29m14.json",
+                "016d15d21c464457aa30eaeab3977228b08cd5acf7542f24067440126c0bf480",
+            ),
+            "2026-01-15_10h29m21.json": (
+                "bam/data.bak/raw/2026-01-15_10h29m21.json",
+                "fe68cff62e976c87a2fcab925a517fbff83be16c862693310fdc1eff743eddab",
+            ),
+            "2026-01-15_10h29m29.json": (
+                "bam/data.bak/raw/2026-01-15_10h29m29.json",
+                "b9ce9fc0f396e6b03bd514e9254cb83b8a64e1a5df1728b9a10e3b4a5a9513ca",
+            ),
+            "2026-01-15_10h29m37.json": (
+                "bam/data.bak/raw/2026-01-15_10h29m37.json",
+                "838d390b7190c4ce1608157cf629989648773b7336728a0931a61c6018c6700b",
+            ),
+            "2026-01-15_10h29m47.json": (
+                "bam/data.bak/raw/2026-01-15_10h29m47.json",
+                "61ae8eeb881be5d8c09f6c7fba4cef39f66b1ff03e0148ef3bc0e314054513f5",
+            ),
+            "2026-01-15_10h29m54.json": (
+                "bam/data.bak/raw/2026-01-15_10h29m54.json",
+                "b50055742ee553a8cb849b38d04d2b9bcf7143d0acefe6539f922984b93d958a",
+            ),
+            "2026-01-15_10h30m02.json": (
+                "bam/data.bak/raw/2026-01-15_10h30m02.json",
+                "040e065f9885833fa909683f13665f90048ce5457d94dd2a3af056c21c36210d",
+            ),
+            "2026-01-15_10h30m10.json": (
+                "bam/data.bak/raw/2026-01-15_10h30m10.json",
+                "01d32db99e7859f012a230aca59f1dda24219d6781472d356861b138526213e6",
             ),
         },
     ),
