@@ -56,7 +56,8 @@ def servo_recording(run: str, folder: pathlib.Path | None = None) -> Recording:
     duty = np.where(counts > WRAP / 2, counts - WRAP, counts) / FULL_DUTY
     volts = duty * log["vin"]
     grid = np.linspace(t[0], t[-1], len(t))
-    even = np.asarray(signal.savgol_filter(np.interp(grid, t, q), SPEED_WINDOW, 2, deriv=1, delta=float(grid[1] - grid[0])))
+    step = float(grid[1] - grid[0])
+    even = np.asarray(signal.savgol_filter(np.interp(grid, t, q), SPEED_WINDOW, 2, deriv=1, delta=step))
     tau = enabled * motor_torque(volts, np.interp(t, grid, even))
     return Recording(t=t, q=q[:, None], tau=tau[:, None], joint_names=(JOINT,), source=run,
                      extras={"goal": column("goal_position"), "volts": volts, "enabled": enabled})  # fmt: skip
