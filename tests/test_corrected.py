@@ -19,7 +19,7 @@ from irb140_jax.mismatch import corrected_robot, predict, prediction_times
 from irb140_jax.mismatch.consistent import consistent, pseudo_inertia
 from irb140_jax.mismatch.model import CorrectedModel, Named, from_json, to_json, torques_along
 from irb140_jax.mismatch.native import NOTES, XML, native_robot, save_native
-from irb140_jax.recordings import read_recording
+from irb140_jax.recordings import Recording, read_recording
 from irb140_jax.recordings.conceal import random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec, rigid_torque
 from irb140_jax.recordings.condition import Band, Conditioned
@@ -85,9 +85,7 @@ def test_the_jax_model_gives_the_torque_that_predict_gives_with_every_effect_at_
     np.testing.assert_allclose(tau[:-2], fitted[:-2], rtol=0, atol=1e-6 * np.abs(fitted).max())
 
 
-INSTANT = (
-    "viscous_friction", "load_dependent_friction", "thermal_friction_drift", "rotor_inertia", "torque_gain", "payload",
-)  # fmt: skip
+INSTANT = ("viscous_friction", "load_dependent_friction", "thermal_friction_drift", "torque_gain")
 
 
 @functools.cache
@@ -240,15 +238,15 @@ def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
 
 
 def test_a_prediction_has_a_row_for_every_row_of_the_file_also_for_repeated_ones(tmp_path):
-    frame = helpers_recordings.frame(helpers_recordings.recording())
-    repeated = frame.loc[np.sort(np.r_[np.arange(len(frame)), 700, 1300])]
+    m, plain = motion(), model()
+    torque = torques_along(plain, as_conditioned(m)).nominal
+    made = Recording(t=m.t, q=m.q, tau=torque, joint_names=arm().joint_names, source="made")
+    frame = helpers_recordings.frame(made)
+    repeated = frame.loc[np.sort(np.r_[np.arange(len(frame)), 300, 700])]
     paths = [tmp_path / "once.csv", tmp_path / "twice.csv"]
     for table, path in zip((frame, repeated), paths, strict=True):
         table.to_csv(path, index=False)
-    robot = helpers_recordings.robot()
-    once, twice = (read_recording(path, robot) for path in paths)
-    phi = np.asarray(robot.phi)
-    plain = CorrectedModel(robot, phi, phi, (), Band(10.0, 16.0, 200.0, 4), np.full(robot.n, REST))
+    once, twice = (read_recording(path, arm()) for path in paths)
     assert len(prediction_times(twice)) == len(repeated) == len(frame) + 2
     expected = predict(plain, once)["corrected"][np.searchsorted(once.t, prediction_times(twice))]
     np.testing.assert_allclose(predict(plain, twice)["corrected"], expected, rtol=1e-9, atol=1e-9)

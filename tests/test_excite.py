@@ -135,7 +135,7 @@ def test_expected_log_odds_grow_with_what_is_added_and_start_at_those_of_the_rec
     lively = questions.gram(fourier_motion(arm()[1], 8.0, open_.band.rate, seed=4))
     assert lively is not None
     (pair,) = open_.pairs
-    now, more, most = (questions.log_odds(k * lively, pair) for k in (0.0, 0.1, 1.0))
+    now, more, most = (questions.margin(k * lively, pair) for k in (0.0, 0.1, 1.0))
     assert np.isfinite([now, more, most]).all() and now < more < most
 
 
@@ -198,7 +198,7 @@ def test_the_sentences_say_what_is_separated_and_what_is_not():
     seen = (9.0,) * len(open_.hidden)
     made = dataclasses.replace(proposal(), odds_now=(0.5,), odds=(40.0,), seen=seen)
     said = " ".join(proposal_sentences(arm()[1], open_, made))
-    assert "On joint2, Coulomb friction or" in said and "40.0 at least" in said and "separates them" in said
+    assert "On joint2, Coulomb friction or" in said and "odds of 40 at least" in said and "separates them" in said
     failed = dataclasses.replace(made, odds=(1.0,))
     assert "no motion that was tried separates them" in " ".join(proposal_sentences(arm()[1], open_, failed))
     nothing = dataclasses.replace(open_, pairs=(), hidden=())

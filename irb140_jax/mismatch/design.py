@@ -81,7 +81,7 @@ def propose(
     coarse = joined(bounded, [segment_motion(bounded, s, PIECE, open_.band.rate) for s in pieces], open_.band.rate)
     whole = questions.gram(coarse)
     assert whole is not None, "no limit was asked for"
-    odds = lambda G: tuple(questions.log_odds(G, p) for p in open_.pairs)  # noqa: E731
+    odds = lambda G: tuple(max(questions.margin(G, p), 0.0) for p in open_.pairs)  # noqa: E731
     seen = lambda G: tuple(map(float, questions.visible(G, open_.hidden)))  # noqa: E731
     return Proposal(motion, pieces, odds(nothing), odds(whole), seen(nothing), seen(whole))
 
@@ -128,7 +128,7 @@ class _Search:
         if not o.pairs and not o.hidden:
             z = self.questions.visible(G, range(len(o.columns)))
             return float(np.mean(np.log(z + 0.1))) if len(z) else 0.0
-        decided = sum(np.log1p(max(self.questions.log_odds(G, p), 0.0)) for p in o.pairs)
+        decided = sum(np.arcsinh(self.questions.margin(G, p)) for p in o.pairs)
         shown = np.sum(np.minimum(self.questions.visible(G, o.hidden) / VISIBLE, 1.0))
         return float(decided + HIDDEN_WEIGHT * shown)
 

@@ -54,11 +54,12 @@ class Questions:
         noise = Noise(o.ar, o.level[None], o.level[None])
         return grams([dataclasses.replace(rows, X=X)], noise, scale, len(self._always), 1).total()[:-1, :-1]
 
-    def log_odds(self, added: np.ndarray, pair: Pair) -> float:
+    def margin(self, added: np.ndarray, pair: Pair) -> float:
         """Log odds expected in favour of the true one of two explanations, whichever is true, the worse of the two.
 
         The log that either predicts is added to the recordings there are; the other does with it what it can, with
-        inertials, amplitudes and shapes free: half the divergence that T-optimal designs maximise.
+        inertials, amplitudes and shapes free: half the divergence that T-optimal designs maximise.  What an imperfect
+        law could feign (`feigned`) is taken off, as the search does; below zero, they stay even.
 
         Source: Atkinson and Fedorov, Biometrika 62(1), 1975; Lopez-Fidalgo, Tommasi, Trandafir, JRSS B 69(2), 2007.
         """
@@ -78,7 +79,10 @@ class Questions:
         H[:-1, -1] += told
         H[-1, :-1] += told
         left, _ = eliminated(H, rest)
-        return max(gain_of(left, own(s)) for s in true) - max(gain_of(left, own(s)) for s in other)
+        mean = posterior(left, own(best)).mean
+        explained = 0.5 * mean @ H[np.ix_(own(best), own(best))] @ mean
+        feigned = max(CATALOGUE[slug].feigned for slug in (pair.named, pair.rival)) ** 2 * explained
+        return max(gain_of(left, own(s)) for s in true) - max(gain_of(left, own(s)) for s in other) - feigned
 
     def visible(self, added: np.ndarray, columns: Sequence[int]) -> np.ndarray:
         """Standard deviations by which effects, at the strength of `testable`, would stand out; one for each column."""

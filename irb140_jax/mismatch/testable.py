@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from scipy import ndimage
 
 from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
@@ -33,6 +34,8 @@ class AtSite(Protocol):
     def joints(self) -> tuple[int, ...]: ...  # noqa: D102
 
 
+ROUNDED = 3.0  # times the speed of rest: from there sign(qd) is right to half a percent
+LEAK = 0.1  # [s] over which the low-pass spreads what happens at a reversal
 Site = tuple[str, tuple[int, ...]]
 
 
@@ -69,20 +72,28 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
     torque, amplitudes = np.sqrt(np.mean(along.nominal**2, axis=0)), np.zeros(lib.size)
     for effect, sites, shapes, first in lib.blocks:
         width = max(max(v) for v in effect.variants) + 1
-        own, likely = np.arange(width)[list(effect.own)], effect.likely(lib.robot)
+        own = np.arange(width)[list(effect.own)]
+        together = [(own, effect.likely(lib.robot)), *(([k], [1.0]) for k in range(width) if k not in own)]
         for k in range(len(sites) * shapes.shape[1]):
-            columns = first + k * width + own
-            power = np.mean(lib.torque(along.effects, columns, likely) ** 2, axis=0)
             # Of the joints it acts on: all of them, for effects that act everywhere.
             joints = slice(None) if effect.everywhere else sites[k // shapes.shape[1]]
-            if power.any():
-                amplitudes[columns] = likely * REFERENCE_SHARE * np.linalg.norm(torque[joints]) / np.sqrt(power.sum())
+            for part, likely in together:
+                columns = first + k * width + np.asarray(part)
+                power = np.mean(lib.torque(along.effects, columns, np.asarray(likely)) ** 2, axis=0).sum()
+                if power > 0.0:
+                    amplitudes[columns] = np.asarray(likely) * REFERENCE_SHARE * np.linalg.norm(torque[joints])
+                    amplitudes[columns] /= np.sqrt(power)
     return Reference(amplitudes, torque)
 
 
 def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
-    """A motion as if it were recorded, with joints unusable where they rest, and without torque."""
-    usable = np.abs(motion.qd) > rest_speed
+    """A motion as if it were recorded, without torque; near rest, where sign(qd) is rounded off, nothing is usable.
+
+    Laws that agree but for that rounding would seem to differ there.
+    """
+    rounded = np.abs(motion.qd) < ROUNDED * rest_speed
+    around = 2 * int(np.ceil(LEAK / (motion.t[1] - motion.t[0]))) + 1
+    usable = ~ndimage.maximum_filter1d(rounded.astype(np.uint8), around, axis=0).astype(bool)
     return Conditioned(
         motion.name, motion.t, motion.q, motion.qd, motion.qdd, np.zeros_like(motion.q), usable, rest_speed, ()
     )

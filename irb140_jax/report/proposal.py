@@ -40,8 +40,8 @@ def _pair(robot: Robot, pair: Pair, now: float, odds: float) -> str:
     where = _listed([robot.joint_names[j] for j in pair.joints])
     one, other = CATALOGUE[pair.named], CATALOGUE[pair.rival]
     said = (
-        f"On {where}, {one.title} or {other.title}: the recordings give log odds of {now:.1f} at best; "
-        f"with this motion beside them {odds:.1f} at least are to be expected for the true one"
+        f"On {where}, {one.title} or {other.title}: log odds of {odds:.3g} at least are to be expected for the true "
+        f"one, against {now:.3g} without this motion"
     )
     if odds > SEPARATED:
         return f"{said}, which separates them."
