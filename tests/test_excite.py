@@ -43,7 +43,7 @@ def slow_case():
 
 @functools.cache
 def proposal():
-    return propose(arm()[1], slow_case()[1].undecided, seed=0, duration=18.0, rate=1000.0)
+    return propose(arm()[1], slow_case()[1].undecided, seed=0, duration=36.0, rate=1000.0)
 
 
 def segments():
@@ -198,7 +198,7 @@ def test_the_sentences_say_what_is_separated_and_what_is_not():
     seen = (9.0,) * len(open_.hidden)
     made = dataclasses.replace(proposal(), odds_now=(0.5,), odds=(40.0,), seen=seen)
     said = " ".join(proposal_sentences(arm()[1], open_, made))
-    assert "On joint2, Coulomb friction or" in said and "odds of 40 at least" in said and "separates them" in said
+    assert "On joint2, Coulomb friction or" in said and "odds of 40 at least" in said and "against 0.5 by" in said
     failed = dataclasses.replace(made, odds=(1.0,))
     assert "no motion that was tried separates them" in " ".join(proposal_sentences(arm()[1], open_, failed))
     nothing = dataclasses.replace(open_, pairs=(), hidden=())

@@ -40,15 +40,13 @@ class HeldOut:
 def folds(g: Grams) -> list[np.ndarray]:
     """Blocks to leave out together: a recording each, or contiguous blocks of the only one.
 
-    A recording that all but alone moves some joint is left out by halves: without it nothing is known of that joint.
+    A recording that all but alone moves some joint is left out block by block, too: without it nothing is known there.
     """
-    if len(set(g.recording)) == 1:
-        return [np.arange(len(g.recording)) == b for b in range(len(g.recording))]
-    out, rows = [], np.maximum(g.rows.sum(axis=0), 1)
+    out, every, rows = [], np.arange(len(g.recording)), np.maximum(g.rows.sum(axis=0), 1)
     for r in sorted(set(g.recording)):
         mine = g.recording == r
-        halves = np.array_split(np.flatnonzero(mine), 2 if np.max(g.rows[mine].sum(axis=0) / rows) > ALONE else 1)
-        out += [np.isin(np.arange(len(mine)), half) for half in halves]
+        alone = np.max(g.rows[mine].sum(axis=0) / rows) > ALONE
+        out += [every == b for b in np.flatnonzero(mine)] if alone else [mine]
     return out
 
 

@@ -39,14 +39,14 @@ def proposal_sentences(robot: Robot, open_: Undecided, proposal: Proposal) -> li
 def _pair(robot: Robot, pair: Pair, now: float, odds: float) -> str:
     where = _listed([robot.joint_names[j] for j in pair.joints])
     one, other = CATALOGUE[pair.named], CATALOGUE[pair.rival]
-    said = (
-        f"On {where}, {one.title} or {other.title}: log odds of {odds:.3g} at least are to be expected for the true "
-        f"one, against {now:.3g} without this motion"
-    )
+    either = f"On {where}, {one.title} or {other.title}"
     if odds > SEPARATED:
-        return f"{said}, which separates them."
+        return (
+            f"{either}: log odds of {odds:.3g} at least are to be expected for the true one, against {now:.3g} by the "
+            "recordings alone."
+        )
     motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
-    return f"{said}: no motion that was tried separates them{f'; what may is {motion}' if motion else ''}."
+    return f"{either}: no motion that was tried separates them{f'; what may is {motion}' if motion else ''}."
 
 
 def _hidden(robot: Robot, open_: Undecided, proposal: Proposal) -> Iterator[str]:
