@@ -81,7 +81,7 @@ class Questions:
         H[-1, :-1] += told
         left, _ = eliminated(H, rest)
         mean = posterior(left, own(best)).mean
-        explained = 0.5 * mean @ H[np.ix_(own(best), own(best))] @ mean
+        explained = 0.5 * float(mean @ H[np.ix_(own(best), own(best))] @ mean)
         feigned = max(CATALOGUE[s].feigned for s in (slug, rival)) ** 2 * explained
         # A special case stands until the law that contains it has beaten that.
         handicap = -feigned if slug in CATALOGUE[rival].contains else feigned
