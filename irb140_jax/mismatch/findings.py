@@ -132,13 +132,16 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
         for key, value in group_odds(ex.problem, rest).items()
         if set(key[1]) & set(c.joints) and key[0] != "inertials" and key not in taken
     }
-    explained = float(ex.problem.explained(ex.chosen)[list(c.joints)].max())
+    explained = {
+        rubs: float(ex.problem.explained(ex.chosen, friction=rubs)[list(c.joints)].max()) for rubs in (True, False)
+    }
     own = odds[c.slug, c.joints]
     for key, value in odds.items():
         if key == (c.slug, c.joints) or key[0] in c.effect.contains:
             continue  # a special case has already lost by more than what an imperfect law could feign
-        excess, guard = value - own, CATALOGUE[key[0]].feigned ** 2 * explained
-        if c.slug in CATALOGUE[key[0]].contains:
+        rival = CATALOGUE[key[0]]
+        excess, guard = value - own, rival.feigned**2 * explained[rival.friction]
+        if c.slug in rival.contains:
             # A law that contains the named one was not needed; even odds where the search would have taken it.
             odds[key] = own + (PREFER * (excess / (guard + PREFER) - 1.0) if excess > 0 else excess - PREFER)
         elif abs(excess) <= guard:

@@ -138,12 +138,14 @@ class Problem:
         H = self.eliminated_near(rest, columns)
         return gain_of(H, np.arange(len(columns))) + float(sum(self.log_prior[c] for c in chosen))
 
-    def explained(self, chosen: tuple[int, ...]) -> np.ndarray:
-        """Half the whitened squared torque that a set explains at each joint, shape (n,)."""
+    def explained(self, chosen: tuple[int, ...], *, friction: bool = False) -> np.ndarray:
+        """Half the whitened squared torque that a set, or the friction in it, explains at each joint, shape (n,)."""
         index = self.columns(chosen)
         if len(index) == 0:
             return np.zeros(len(self.per_joint))
-        v = posterior(self.H, index).mean
+        members = [self.candidates[c] for c in chosen]
+        counts = np.concatenate([np.full(len(m.columns), m.effect.friction or not friction) for m in members])
+        v = np.where(counts, posterior(self.H, index).mean, 0.0)
         explained = np.einsum("i,jik,k->j", v, self.per_joint[:, index[:, None], index[None, :]], v)
         return 0.5 * explained
 
@@ -199,8 +201,14 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
 
 
 def _hurdle(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
-    """Log odds that imperfect laws of the set could feign for each candidate, at the joint where they are largest."""
-    explained = np.max(np.where(problem.at_joint, problem.explained(chosen)[:, None], 0.0), axis=0)
+    """Log odds that imperfect laws of the set could feign for each candidate, at the joint where they are largest.
+
+    Friction is feigned by friction: what tilts, weighs or springs does not turn with the direction of motion.
+    """
+    rubs = np.array([c.effect.friction for c in problem.candidates])
+    by_friction, by_all = problem.explained(chosen, friction=True), problem.explained(chosen)
+    explained = np.where(rubs, by_friction[:, None], by_all[:, None])
+    explained = np.max(np.where(problem.at_joint, explained, 0.0), axis=0)
     return np.array([c.effect.feigned**2 for c in problem.candidates]) * explained
 
 
