@@ -9,6 +9,7 @@ from irb140_jax.effects.base import AbstractEffect, Parameter
 NORMALS = 128  # directions of the first scan, some 16 degrees apart
 SHARES = (0.02, 0.05, 0.1, 0.2, 0.35)  # of the samples behind the wall, in the first scan
 DEEPEST = 0.5  # share of the samples behind the wall; beyond it this is no contact but a spring
+THIN = 3  # every third row: depths change slowly
 STARTS = 3  # walls from which the first scan is refined
 TILT, SHIFT = 0.02, 0.005  # first steps of the grid around the best wall: [rad] and share of the tool's travel
 
@@ -61,6 +62,7 @@ class Contact(AbstractEffect):
         return np.array([best, *tilted, best + [0, 0, 0, shift], best - [0, 0, 0, shift]])
 
     def scout(self, left, scales, joints):
+        left = left.every(THIN)
         travel = float(np.ptp(left.tool, axis=0).max())
         if travel < 1e-6:
             return None
@@ -68,6 +70,8 @@ class Contact(AbstractEffect):
             np.append(n, np.quantile(left.tool @ n, share)) for n in _sphere(NORMALS) for share in SHARES
         ])  # fmt: skip
         gains = np.concatenate([_gain(left, part) for part in np.array_split(walls, NORMALS)])
+        if gains.max() < np.log(self.scanned):
+            return None  # no better than the best of so many is by chance
         found = [_climbed(left, walls[i], travel) for i in _apart(walls[:, :3], gains)]
         best = found[int(np.argmax([_gain(left, wall[None])[0] for wall in found]))]
         return self._around(best, TILT, SHIFT * travel)
@@ -129,7 +133,7 @@ def _climbed(left, wall, travel):
 
     start = np.vstack([np.zeros(3), np.diag([0.15, 0.15, 0.03])])
     found = optimize.minimize(lambda x: -_gain(left, turned(x)[None])[0], np.zeros(3), method="Nelder-Mead",
-                              options={"maxfev": 120, "initial_simplex": start})  # fmt: skip
+                              options={"maxfev": 80, "initial_simplex": start})  # fmt: skip
     return turned(found.x)
 
 

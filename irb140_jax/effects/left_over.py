@@ -32,6 +32,10 @@ class LeftOver:
     y: Float[np.ndarray, "R n"]
     known: Float[np.ndarray, "R n k"]
 
+    def every(self, step: int) -> "LeftOver":
+        """Every so many rows: enough for what is large and slow."""
+        return dataclasses.replace(self, **{f.name: getattr(self, f.name)[::step] for f in dataclasses.fields(self)})
+
     @cached_property
     def _half(self) -> tuple[np.ndarray, np.ndarray]:
         """Cholesky factor L of the known columns' posterior precision, and L^-1 known' y."""

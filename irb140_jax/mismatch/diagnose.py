@@ -13,16 +13,15 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
 from irb140_jax.mismatch.candidates import scales_of
-from irb140_jax.mismatch.evidence import posterior
 from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior
 from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
-from irb140_jax.mismatch.prove import HeldOut, held_out, refit_problem, transferring
+from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, refitted, transferring
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
 from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
-from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.condition import Band, choose_band, condition
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 
@@ -99,18 +98,18 @@ def _diagnosed(
     ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, progress)
     progress("proving on data that the fit did not see")
     ex = transferring(ex)
-    refit_grams, refit_columns = refit_problem(ex)
-    proof = held_out(ex, refit_grams, refit_columns)
+    refit = refitted(ex)
+    proof = held_out(ex, refit)
     progress("looking for structure that no effect explains")
     rest = unexplained(ex, proof)
     doubtful = {c for u in rest for c in u.doubtful}
     if doubtful:  # names that only stand in for what has none
         ex = dataclasses.replace(ex, chosen=tuple(c for c in ex.chosen if c not in doubtful))
-        proof = held_out(ex, refit_grams, refit_columns)
+        proof = held_out(ex, refit)
         rest = unexplained(ex, proof)
     found = findings(robot, ex)
     scales = scales_of(smooth, robot)
-    model = _model(robot, ex, refit_grams, refit_columns, band, scales.rest_speed)
+    model = _model(robot, ex, refit, band, scales.rest_speed)
     matters = reference(ex.lib, scales, band.rate)
     seen = visibility(ex, matters)
     diagnosis = _document(robot, ex, proof, found, rest, recordings, seen)
@@ -118,16 +117,14 @@ def _diagnosed(
     return Result(diagnosis, model, _views(robot, ex, proof, model, recordings, smooth, diagnosis), open_)
 
 
-def _model(
-    robot: Robot, ex: Explanation, refit_grams, refit_columns: np.ndarray, band, rest_speed: np.ndarray
-) -> CorrectedModel:
+def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band, rest_speed: np.ndarray) -> CorrectedModel:
     loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
-    refit, _, _ = fitted(ex.data, posterior(refit_grams.total(), refit_columns), loose, ex.factor)
+    refitted_shift, _, _ = fitted(ex.data, refit.posterior(), loose, ex.factor)
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     dphi, members, amplitudes = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)
     named = tuple(Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True))
-    phi_refit, phi_corrected = (phi + shift.reshape(phi.shape) for shift in (refit, dphi))
+    phi_refit, phi_corrected = (phi + shift.reshape(phi.shape) for shift in (refitted_shift, dphi))
     return CorrectedModel(robot, phi_refit, phi_corrected, named, band, rest_speed)
 
 

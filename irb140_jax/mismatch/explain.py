@@ -109,8 +109,9 @@ def explain(
 
 def _settled(lib: Library, data: Data, factor: np.ndarray, chosen: tuple[int, ...], noise: Noise | None) -> Explanation:
     """Search and noise in turn: noise that the last explanation left may hide an effect that it named wrongly."""
+    rounds = 1 if noise else 2  # the noise of the round before is nearly right
     noise = noise or first_noise(data)
-    for _ in range(2):
+    for _ in range(rounds):
         prob, g = problem(data, noise, blocks=1)
         chosen = search(prob, chosen)
         noise = _noise_under(data, prob, g, chosen)

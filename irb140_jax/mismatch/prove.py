@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
-from irb140_jax.mismatch.assemble import problem
-from irb140_jax.mismatch.evidence import Grams, posterior
+from irb140_jax.mismatch.assemble import BLOCKS
+from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
 from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.name import PREFER, simpler
 from irb140_jax.mismatch.noise import noise_from_residuals
@@ -50,28 +50,44 @@ def folds(g: Grams) -> list[np.ndarray]:
     return out
 
 
-def refit_problem(ex: Explanation) -> tuple[Grams, np.ndarray]:
-    """Gram matrices under the noise of the rigid body alone, and the columns that a refit of inertials uses."""
-    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
-    columns = ex.columns(loose)
-    noise, g = ex.noise, ex.grams
+@dataclasses.dataclass(frozen=True)
+class Refit:
+    """The rigid body with refitted inertials and nothing else.
+
+    Attributes:
+        grams: Gram matrices of its columns alone, under the noise that it leaves.
+        columns: Which of all columns those are.
+    """
+
+    grams: Grams
+    columns: np.ndarray
+
+    def posterior(self, without: np.ndarray | None = None) -> Posterior:
+        """Inertials from all blocks, or from all but some."""
+        post = posterior(self.grams.total(without), np.arange(len(self.columns)))
+        return dataclasses.replace(post, columns=self.columns)
+
+
+def refitted(ex: Explanation) -> Refit:
+    """Refit the inertials; links that the explanation found wrong beyond their stated uncertainty are free here too."""
+    columns = ex.columns(tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials"))
+    stretches = [dataclasses.replace(s, X=s.X[..., columns]) for s in ex.data.stretches]
+    noise, scale = ex.noise, ex.data.scale[columns]
     for _ in range(2):
-        w = posterior(g.total(), columns)
-        coefficients = w.mean * ex.data.scale[columns]
-        residuals = [s.y - s.X[..., columns] @ coefficients for s in ex.data.stretches]
-        noise = noise_from_residuals(residuals, [s.use for s in ex.data.stretches], np.zeros(residuals[0].shape[1]))
-        g = problem(ex.data, noise)[1]
-    return g, columns
+        w = posterior(grams(stretches, noise, scale, len(columns), 1).total(), np.arange(len(columns))).mean
+        residuals = [s.y - s.X @ (w * scale) for s in stretches]
+        noise = noise_from_residuals(residuals, [s.use for s in stretches], np.zeros(residuals[0].shape[1]))
+    return Refit(grams(stretches, noise, scale, len(columns), BLOCKS), columns)
 
 
-def held_out(ex: Explanation, refit_grams: Grams, refit_columns: np.ndarray) -> HeldOut:
+def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     """Residuals of the rival models, each row predicted from the other recordings (or blocks)."""
     data, once = ex.data, _happening_once(ex, ex.chosen)
     seen = full_posterior(data, ex.problem, ex.grams, ex.chosen).mean
     out = {name: [s.y.copy() for s in data.stretches] for name in ("refit", "corrected")}
     for fold in folds(ex.grams):
         fits = {
-            "refit": (refit_columns, posterior(refit_grams.total(fold), refit_columns).mean),
+            "refit": (refit.columns, refit.posterior(fold).mean),
             "corrected": (
                 ex.columns(),
                 np.where(once, seen, full_posterior(data, ex.problem, ex.grams, ex.chosen, fold).mean),

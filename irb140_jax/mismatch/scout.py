@@ -9,6 +9,7 @@ from irb140_jax.mismatch.assemble import Data, assemble
 from irb140_jax.mismatch.candidates import Library, Prepared, Stretch, library, reshaped, stretch
 from irb140_jax.recordings.condition import Band
 
+THIN = 2  # every second of them in a scan; the search then sees all rows
 MOST_ROWS = 2000  # thinned to so many: shapes are found from what is large and slow
 
 
@@ -48,7 +49,8 @@ def _scanned(
     scanning = [e for e, sites, *_ in lib.blocks if len(e.scan(scales, sites[0]))]
     many = library(lib.robot, scanning, scales, scan=True)
     rows = [stretch(many, r, i, band) for i, r in enumerate(along)]
-    X = _thinned(rows, lambda s: s.X[..., 10 * lib.robot.n :])
+    X = _thinned(rows, lambda s: s.X[..., 10 * lib.robot.n :])[::THIN]
+    left = left.every(THIN)
     best: dict[tuple[str, tuple[int, ...]], tuple[float, np.ndarray]] = {}
     for c in many.candidates:
         gain, w = left.gains(X[None][..., c.columns])
