@@ -60,6 +60,13 @@ def _in_set(case: dict) -> bool:
     )
 
 
+def _owned_up(case: dict) -> bool:
+    """Nothing added, and whatever is missing stands in the list of what this motion can't show."""
+    blind = {(n["effect"], j) for n in case["not_testable"] for j in n["joints"]}
+    missing = truths(case) - founds(case)
+    return not founds(case) - truths(case) and all(any((slug, j) in blind for j in joints) for slug, joints in missing)
+
+
 def _removed(case: dict) -> float:
     """Held-out squared error that the findings remove, over what an oracle told the effect removes."""
     joints = {j for e in case["truth"] for j in e["joints"]}
@@ -128,6 +135,7 @@ MEASURES: dict[str, dict[str, Callable[[list[dict]], str]]] = {
         "joints located exactly": lambda cs: _percent(
             {j for _, js in truths(c) for j in js} == {j for _, js in founds(c) for j in js} for c in cs),
         "name exact, nothing added": lambda cs: _percent(truths(c) == founds(c) for c in cs),
+        "exact, or what is missing is listed as not testable": lambda cs: _percent(_owned_up(c) for c in cs),
         "name within the stated set": lambda cs: _percent(_in_set(c) for c in cs),
         "mean size of a stated set": lambda cs: f"{_mean([len(s) for c in cs for s in _stated(c)]):.2f}",
         "held-out error removed, over what an oracle removes, median": lambda cs: _median(_removed(c) for c in cs),
@@ -140,6 +148,7 @@ MEASURES: dict[str, dict[str, Callable[[list[dict]], str]]] = {
     },
     "several": {
         "every one named": lambda cs: _percent(truths(c) <= founds(c) for c in cs),
+        "exact, or what is missing is listed as not testable": lambda cs: _percent(_owned_up(c) for c in cs),
         "at least one named": lambda cs: _percent(bool(truths(c) & founds(c)) for c in cs),
         "findings that are not there, per case": lambda cs: f"{np.mean([_not_there(c) for c in cs]):.2f}",
     },
@@ -209,12 +218,12 @@ def _by_effect(cases: list[dict]) -> list[str]:
 
 
 def _misses(cases: list[dict]) -> list[str]:
-    lines = ["", "| case | robot | missed | added | verdict |", "|---|---|---|---|---|"]
+    lines = ["", "| case | robot | missed | added | verdict | listed as not testable |", "|---|---|---|---|---|---|"]
     for c in cases:
         missed, added, n = truths(c) - founds(c), founds(c) - truths(c), c["joints_of_robot"]
         if missed or added:
             lines.append(f"| {c['row']} {c['seed']} | {n} joint{'s' if n > 1 else ''} | {said(missed, n)} "
-                         f"| {said(added, n)} | {c['verdict']} |")
+                         f"| {said(added, n)} | {c['verdict']} | {'yes' if missed and _owned_up(c) else ''} |")
     return lines
 
 
