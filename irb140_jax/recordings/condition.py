@@ -107,8 +107,8 @@ def choose_band(recordings: list[Recording], robot: Robot) -> Band:
         t, q, _, _ = _even(recording)
         rate = (len(t) - 1) / (t[-1] - t[0])
         rates.append(rate)
-        noise = [white_noise(recording.t, x) for x in recording.q.T]
-        top.append([_signal_limit(x, 2.0 * s**2 / rate, rate) for x, s in zip(q.T, noise, strict=True)])
+        density = _density(recording, t, rate)
+        top.append([_signal_limit(x, d, rate) for x, d in zip(q.T, density, strict=True)])
     # The fastest recording decides; within it, the middling joint: a still joint says nothing, a noisy one too much.
     limit = max((float(np.median([f for f in row if f > 0] or [0.0])) for row in top), default=0.0)
     slowest = float(min(rates))
@@ -187,8 +187,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     h, h1, h2 = _kernels(band.position, raw_rate)
     half = (len(h) - 1) // 2
     anti_alias = _kernels(min(0.4 * band.rate, 0.45 * raw_rate), raw_rate)[0]
-    density = np.array([2.0 * white_noise(recording.t, x) ** 2 / raw_rate for x in recording.q.T])
-    q, speed_noise = _without_noise(q, density, raw_rate, h1)
+    q, speed_noise = _without_noise(q, _density(recording, t, raw_rate), raw_rate, h1)
     smoothed = [_filtered(q, k, odd=True) for k in (h, h1, h2)]
     tau = _filtered(tau, anti_alias, odd=False)
     keep = slice(None) if pad else slice(half, len(t) - half)
@@ -255,20 +254,30 @@ def _spectrum(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, n
     return f, p, max(float(np.median(p[f > 0.6 * f[-1]])), density)
 
 
+def _density(recording: Recording, even: np.ndarray, rate: float) -> np.ndarray:
+    """Power density of the white noise in positions that had to be resampled [rad^2/Hz or m^2/Hz], else 0, shape (n,).
+
+    Resampling smooths the noise, so that its spectrum's top no longer shows it.
+    """
+    if even is recording.t:
+        return np.zeros(recording.q.shape[1])
+    return np.array([2.0 * white_noise(recording.t, x) ** 2 / rate for x in recording.q.T])
+
+
 def white_noise(t: np.ndarray, x: np.ndarray) -> float:
     """Standard deviation of the white part of a smooth signal, unevenly sampled or not.
 
-    Every sample is compared with the cubic through its four neighbours; the median is robust to the signal.  Resampling
-    smooths the noise, so it has to be known from the samples themselves.
+    Every sample is compared with the quintic through its six neighbours; the median is robust to the signal.
     """
-    if len(x) < 10:
+    if len(x) < 20:
         return 0.0
-    near = [t[i : len(t) - 4 + i] - t[2:-2] for i in (0, 1, 3, 4)]
+    places, last = (0, 1, 2, 4, 5, 6), len(x) - 6
+    near = [t[i : last + i] - t[3:-3] for i in places]
     weights = np.stack([
-        np.prod([near[m] / (near[m] - near[k]) for m in range(4) if m != k], axis=0) for k in range(4)
+        np.prod([near[m] / (near[m] - near[k]) for m in range(6) if m != k], axis=0) for k in range(6)
     ])  # fmt: skip
-    values = np.stack([x[i : len(x) - 4 + i] for i in (0, 1, 3, 4)])
-    off = (x[2:-2] - np.sum(weights * values, axis=0)) / np.sqrt(1.0 + np.sum(weights**2, axis=0))
+    values = np.stack([x[i : last + i] for i in places])
+    off = (x[3:-3] - np.sum(weights * values, axis=0)) / np.sqrt(1.0 + np.sum(weights**2, axis=0))
     moving = off[np.ptp(values, axis=0) > 0]  # at rest, a coarse encoder shows no noise
     return float(np.median(np.abs(moving)) / 0.6745) if len(moving) > 10 else 0.0
 
