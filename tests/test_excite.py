@@ -107,6 +107,7 @@ def test_what_another_joints_motion_cannot_show_is_not_testable():
     for effect in ("load_dependent_friction", "coulomb_friction", "stribeck_friction", "viscous_friction"):
         assert "joint2" in blind[effect]["joints"] and "joint1" not in blind[effect]["joints"]
         assert blind[effect]["needs"].startswith("Needs ")
+    assert "external_wrench" not in blind  # a push leaves its trace whenever it comes
 
 
 def test_the_proposed_motion_makes_the_hidden_effect_visible():

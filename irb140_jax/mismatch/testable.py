@@ -116,8 +116,8 @@ def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, i
     for i, c in enumerate(ex.data.candidates):
         if c.slug == "inertials" or any(_related(c, m) for m in ex.members):
             continue
-        if not matters.amplitudes[c.columns].any():
-            continue  # a wall or a push elsewhere: lively motion would not show it either
+        if c.effect.scouts and not matters.amplitudes[c.columns].any():
+            continue  # a wall or a push at no place or time in particular
         scale = ex.data.scale[ex.data.nuisances + c.columns]
         strength = matters.in_prior_units(c.columns, scale)
         z = stands_out(H, c, c.columns + ex.problem.offset, strength, ex.members)
