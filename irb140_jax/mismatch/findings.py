@@ -13,6 +13,7 @@ from irb140_jax.mismatch.name import PREFER, group_odds
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
 from irb140_jax.robot import Robot
 
+NEIGHBOURS = 12  # shapes around the named one that tell how finely its grid resolves each parameter
 WORTH_SAYING = 0.02  # alternatives less probable than this stay unsaid
 
 
@@ -90,13 +91,13 @@ def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.
     p /= p.sum()
     shapes = np.array([ex.data.candidates[i].shape for i in alike])
     off = np.abs(shapes - c.shape) / np.maximum(np.ptp(shapes, axis=0), 1e-300)
-    nearest = set(np.argsort(off.sum(axis=1))[1 : 1 + 2 * shapes.shape[1]].tolist())
+    nearest = set(np.argsort(off.sum(axis=1))[1 : 1 + NEIGHBOURS].tolist())
     refitted = {k: _refitted(ex, index, alike[k]) for k in range(len(alike)) if p[k] > 1e-3 or k in nearest}
     between = np.sum([p[k] * (v - value) ** 2 for k, v in refitted.items()], axis=0)
     # A posterior narrower than the grid is known to the grid's spacing.
-    steps = [np.abs(refitted[k] - value) for k in nearest]
-    spacing = np.min(steps, axis=0) if steps else np.zeros(len(value))
-    return np.maximum(between, spacing**2 / 12.0)
+    steps = np.array([np.abs(refitted[k] - value) for k in nearest]).reshape(-1, len(value))
+    spacing = np.min(np.where(steps > 1e-9 * np.abs(value), steps, np.inf), axis=0, initial=np.inf)
+    return np.maximum(between, np.where(np.isfinite(spacing), spacing, 0.0) ** 2 / 12.0)
 
 
 def _refitted(ex: Explanation, index: int, other: int) -> np.ndarray:
