@@ -442,10 +442,8 @@ def test_compiled_columns_are_those_of_the_plain_function(effect):
     np.testing.assert_allclose(eqx.filter_jit(effect.columns)(motion(), joints, shape), plain, rtol=1e-13, atol=1e-15)
 
 
-# Bending friction and bristles hold their special case at one shape or in a limit only.
-AT_ANY_SHAPE = [
-    e for s, e in CATALOGUE.items() if e.contains and s not in ("nonlinear_viscous_friction", "presliding_hysteresis")
-]
+# The others hold their special case at one shape or in a limit only, and may stand beside it.
+AT_ANY_SHAPE = [e for e in CATALOGUE.values() if e.contains and e.absorbs]
 
 
 @pytest.mark.parametrize("effect", AT_ANY_SHAPE, ids=lambda e: e.slug)

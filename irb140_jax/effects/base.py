@@ -105,7 +105,8 @@ class AbstractEffect(abc.ABC):
         title: A few words for a person.
         equation, source: The law and where it comes from.
         parameters: Physical parameters, in the order that `physical` returns them.
-        contains: Slugs of effects that are special cases of this one (they compete, never stand side by side).
+        contains: Slugs of effects that are special cases of this one: they compete.
+        absorbs: Whether the law and a special case side by side are again the law, so that they never stand so.
         variants: Subsets of the columns that make sense by themselves.
         confused_with: Slug of a look-alike -> the motion which separates the two.
         needs: The motion that would show the effect.
@@ -133,6 +134,7 @@ class AbstractEffect(abc.ABC):
     source: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
     contains: ClassVar[tuple[str, ...]] = ()
+    absorbs: ClassVar[bool] = True
     variants: ClassVar[tuple[tuple[int, ...], ...]]
     confused_with: ClassVar[dict[str, str]] = {}
     needs: ClassVar[str]

@@ -58,10 +58,10 @@ class LeftOver:
             columns: Torque per unit of each amplitude [N m or N], shape (C, rows, n, k).
             rows: Which rows those are, where the columns are zero in all others.
         """
-        rows = np.ones(len(self.t), dtype=bool) if rows is None else rows
+        part = slice(None) if rows is None else rows  # a mask copies, and these are large
         C, _, _, k = columns.shape
-        flat = (columns * self.weight[rows][..., None]).reshape(C, -1, k)
-        B, y = self.known[rows].reshape(-1, self.known.shape[-1]), self.y[rows].ravel()
+        flat = (columns * self.weight[part][..., None]).reshape(C, -1, k)
+        B, y = self.known[part].reshape(-1, self.known.shape[-1]), self.y[part].ravel()
         half, b = self._half
         stacked = flat.transpose(1, 0, 2).reshape(len(y), C * k)
         shared = linalg.solve_triangular(half, B.T @ stacked, lower=True)

@@ -21,6 +21,7 @@ class PreslidingHysteresis(AbstractEffect):
     source = "P. R. Dahl, A solid friction model, Aerospace Corp. TOR-0158, 1968"
     parameters = (Parameter("coulomb", "{tau}", low=0.0), Parameter("stiffness", "{tau}/{q}", low=0.0))
     contains = ("coulomb_friction",)
+    absorbs = False  # what slips at once beside what is springy first is neither alone
     variants = ((0,),)
     confused_with = {
         "backlash": "reversals under different preload",

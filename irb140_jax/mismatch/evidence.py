@@ -8,7 +8,10 @@ up to a constant that all sets share.  Inertial parameters are always in; they a
 """
 
 import dataclasses
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 from scipy import linalg
@@ -52,30 +55,34 @@ def grams(stretches: list[Stretch], noise: Noise, scale: np.ndarray, nuisances: 
         nuisances: Number of inertial columns, which come first.
         blocks: Contiguous blocks per recording.
     """
-    n = stretches[0].y.shape[1]
-    K = stretches[0].X.shape[-1]
-    out, rows, of = [], [], []
-    per_joint = np.zeros((n, K + 1, K + 1))
-    for r, s in enumerate(stretches):
-        edges = np.linspace(0, len(s.t), blocks + 1).astype(int)
-        G = np.zeros((blocks, K + 1, K + 1))
-        count = np.zeros((blocks, n))
-        for j in range(n):
-            active = np.flatnonzero(np.any(s.X[:, j] != 0.0, axis=0))
-            A = np.concatenate([s.X[:, j][:, active] * scale[active], s.y[:, j : j + 1]], axis=1)
-            A = noise.whitened(A, j, r)
-            ok = Noise.usable(s.use[:, j])
-            index = np.concatenate([active, [K]])
-            for b in range(blocks):
-                part = A[edges[b] : edges[b + 1]][ok[edges[b] : edges[b + 1]]]
-                gram = part.T @ part
-                G[b][np.ix_(index, index)] += gram
-                per_joint[j][np.ix_(index, index)] += gram
-                count[b, j] = len(part)
-        out.append(G)
-        rows.append(count)
-        of += [s.recording] * blocks
-    return Grams(np.concatenate(out), per_joint, np.array(of), np.concatenate(rows), nuisances)
+    n, size = stretches[0].y.shape[1], stretches[0].X.shape[-1] + 1
+    total, per_joint = np.zeros((len(stretches) * blocks, size, size)), np.zeros((n, size, size))
+    rows = np.zeros((len(stretches) * blocks, n))
+    # Joints side by side: nearly all of the time is in products, and those hold no lock.
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        joints = threads.map(partial(_grams_of_joint, stretches, noise, scale, blocks), range(n))
+        for j, (index, own, count) in enumerate(joints):
+            total[:, index[:, None], index] += own
+            per_joint[j][np.ix_(index, index)] = own.sum(axis=0)
+            rows[:, j] = count
+    return Grams(total, per_joint, np.repeat([s.recording for s in stretches], blocks), rows, nuisances)
+
+
+def _grams_of_joint(
+    stretches: list[Stretch], noise: Noise, scale: np.ndarray, blocks: int, j: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns that are not zero throughout and y; their Gram matrices by block; and the rows of each block."""
+    active = np.flatnonzero(np.any([np.any(s.X[:, j] != 0.0, axis=0) for s in stretches], axis=0))
+    out, count = [], []
+    for s in stretches:
+        A = np.concatenate([s.X[:, j][:, active] * scale[active], s.y[:, j : j + 1]], axis=1)
+        A, usable = noise.whitened(A, j, s.recording), Noise.usable(s.use[:, j])
+        edges = np.linspace(0, len(A), blocks + 1).astype(int)
+        for block in map(slice, edges[:-1], edges[1:]):
+            part = A[block][usable[block]]
+            out.append(part.T @ part)
+            count.append(len(part))
+    return np.append(active, stretches[0].X.shape[-1]), np.stack(out), np.array(count)
 
 
 def with_prior(G: np.ndarray) -> np.ndarray:

@@ -189,7 +189,7 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
     while len(chosen) < MOST:
         scores = problem.scores(chosen) + problem.entry - _hurdle(problem, chosen) - ACCEPT
         scores[[*chosen, *banned]] = -np.inf
-        scores = np.where(_conflicts(problem, chosen), -np.inf, scores)
+        scores = np.where(conflicts(problem, chosen), -np.inf, scores)
         best = int(np.argmax(scores))
         if scores[best] <= 0:
             break
@@ -212,17 +212,29 @@ def _hurdle(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
     return np.array([c.effect.feigned**2 for c in problem.candidates]) * explained
 
 
-def _conflicts(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
-    """Candidates that can't stand beside the set: the same effect at the site, or one that contains or is contained."""
+def conflicts(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
+    """Candidates that can't stand beside the set: the same effect at the site, or one that absorbs the other."""
     taken: dict[tuple[int, ...], set[str]] = defaultdict(set)
-    contained: dict[tuple[int, ...], set[str]] = defaultdict(set)
+    absorbed: dict[tuple[int, ...], set[str]] = defaultdict(set)
     for c in (problem.candidates[i] for i in chosen):
         taken[c.joints].add(c.slug)
-        contained[c.joints] |= set(c.effect.contains)
+        absorbed[c.joints] |= _absorbed(c)
     return np.array([
-        c.slug in taken[c.joints] | contained[c.joints] or bool(set(c.effect.contains) & taken[c.joints])
+        c.slug in taken[c.joints] | absorbed[c.joints] or bool(_absorbed(c) & taken[c.joints])
         for c in problem.candidates
     ])  # fmt: skip
+
+
+def possible_beside(problem: Problem, chosen: tuple[int, ...], options: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Those of some sets that can stand beside another."""
+    if not options:
+        return []
+    bad = conflicts(problem, chosen)
+    return [o for o in options if not bad[list(o)].any()]
+
+
+def _absorbed(c: Candidate) -> set[str]:
+    return set(c.effect.contains) if c.effect.absorbs else set()
 
 
 def _settled(
@@ -254,7 +266,7 @@ def _exchange(
         rest = tuple(c for c in chosen if c not in drop)
         old = [problem.candidates[c] for c in drop]
         scores = problem.scores(rest, {j for c in old for j in c.joints}) - problem.odds(rest, drop)
-        scores[_conflicts(problem, rest)] = -np.inf
+        scores[conflicts(problem, rest)] = -np.inf
         scores[[*drop, *banned]] = -np.inf
         for i in np.flatnonzero(scores > best):
             c = problem.candidates[i]
@@ -274,9 +286,7 @@ def _simplify(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) 
     hurdle = _hurdle(problem, chosen)
     for d in near:
         rest = tuple(x for x in chosen if x != d)
-        options = [
-            o for o in simpler(problem, d) if not any(problem.candidates[i].slug in _slugs(problem, rest, i) for i in o)
-        ]
+        options = possible_beside(problem, rest, simpler(problem, d))
         if not options:
             continue
         possible = np.isfinite(problem.scores(rest, problem.candidates[d].joints))
@@ -310,12 +320,6 @@ def simpler(problem: Problem, d: int) -> list[tuple[int, ...]]:
 def _size(c: Candidate) -> int:
     """Parameters of a candidate: amplitudes and shape."""
     return len(c.columns) + len(c.shape)
-
-
-def _slugs(problem: Problem, chosen: tuple[int, ...], i: int) -> set[str]:
-    """Effects of a set at the site of a candidate."""
-    joints = problem.candidates[i].joints
-    return {problem.candidates[c].slug for c in chosen if problem.candidates[c].joints == joints}
 
 
 def _remove(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) -> tuple[int, ...] | None:

@@ -7,7 +7,7 @@ import numpy as np
 from irb140_jax.mismatch.assemble import BLOCKS
 from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
 from irb140_jax.mismatch.explain import Explanation, full_posterior
-from irb140_jax.mismatch.name import PREFER, simpler
+from irb140_jax.mismatch.name import PREFER, possible_beside, simpler
 from irb140_jax.mismatch.noise import noise_from_residuals
 
 ALONE = 0.8  # share of a joint's usable rows from which a recording is the only one that says much of the joint
@@ -148,8 +148,7 @@ def transferring(ex: Explanation) -> Explanation:
             if ex.data.candidates[c].slug == "inertials":
                 continue
             rest = tuple(x for x in ex.chosen if x != c)
-            taken = {_site(ex, x) for x in rest}
-            options = [o for o in simpler(ex.problem, c) if not any(_site(ex, i) in taken for i in o)]
+            options = possible_beside(ex.problem, rest, simpler(ex.problem, c))
             for option, least in ((), 0.0), *((o, PREFER) for o in options):
                 loss = 0.5 * (unseen_error(ex, (*rest, *option)) - error) - least
                 if loss < worst:
@@ -157,11 +156,6 @@ def transferring(ex: Explanation) -> Explanation:
         if better == ex.chosen:
             return ex
         ex = dataclasses.replace(ex, chosen=better)
-
-
-def _site(ex: Explanation, candidate: int) -> tuple[str, tuple[int, ...]]:
-    c = ex.data.candidates[candidate]
-    return c.slug, c.joints
 
 
 def jackknife_factor(ex: Explanation) -> np.ndarray:

@@ -7,9 +7,11 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect, LeftOver, Scales
 from irb140_jax.mismatch.assemble import Data, assemble
 from irb140_jax.mismatch.candidates import Library, Prepared, Stretch, library, reshaped, stretch
+from irb140_jax.mismatch.evidence import layouts
 from irb140_jax.recordings.condition import Band
 
 THIN = 2  # every second of them in a scan; the search then sees all rows
+AT_ONCE = 64  # candidates of a scan in one product: fast, and not much memory
 MOST_ROWS = 2000  # thinned to so many: shapes are found from what is large and slow
 
 
@@ -52,11 +54,14 @@ def _scanned(
     X = _thinned(rows, lambda s: s.X[..., 10 * lib.robot.n :])[::THIN]
     left = left.every(THIN)
     best: dict[tuple[str, tuple[int, ...]], tuple[float, np.ndarray]] = {}
-    for c in many.candidates:
-        gain, w = left.gains(X[None][..., c.columns])
-        key, inside = (c.slug, c.joints), np.all((w[0] >= c.lowest) & (w[0] <= c.highest))
-        if inside and gain[0] > best.get(key, (0.0,))[0]:
-            best[key] = (float(gain[0]), c.shape)
+    for group in layouts(many.candidates, 0):
+        for some in np.array_split(np.arange(len(group.which)), -(-len(group.which) // AT_ONCE)):
+            gains, w = left.gains(np.moveaxis(X[..., group.columns[some]], 2, 0))
+            for i, gain, amplitudes in zip(group.which[some], gains, w, strict=True):
+                c = many.candidates[int(i)]
+                key, inside = (c.slug, c.joints), np.all((amplitudes >= c.lowest) & (amplitudes <= c.highest))
+                if inside and gain > best.get(key, (0.0,))[0]:
+                    best[key] = (float(gain), c.shape)
     return {key: shape for key, (_, shape) in best.items()}
 
 

@@ -22,6 +22,7 @@ WORKING_RATE = 200.0  # Hz; columns are evaluated at least this often
 SLOW = 3.0  # Hz; below, model and log may differ by the very friction that is looked for
 INCOHERENT = 0.05  # share of the model's torque that may be noise: what biases parameters by as much
 CERTAIN = 1.5  # times the noise that a spectrum must exceed before any of it counts as signal: its own scatter
+AT_ONCE = 32  # low-passed rows in one product: about as long as the filter
 KAISER_BETA = 6.0  # about 63 dB in the stop band: below the noise of any torque log
 
 
@@ -47,20 +48,17 @@ class Band:
 
     def apply(self, x: np.ndarray) -> np.ndarray:
         """Low-pass along axis 0 and keep every `step`-th sample; the filter's ends are left out."""
-        taps = self.low_pass()
-        if len(x) < len(taps) + self.step:
-            return x[:0]
-        flat = np.ascontiguousarray(x.reshape(len(x), -1))
-        full = signal.upfirdn(taps, flat, down=1, axis=0) if self.step == 1 else None
-        if full is not None:
-            y = full[len(taps) - 1 : len(x)]
-        else:
-            # Shift so that the kept samples start where the filter is filled, then let upfirdn skip the rest.
-            pad = (-(len(taps) - 1)) % self.step
-            padded = np.concatenate([np.zeros((pad, flat.shape[1])), flat])
-            y = signal.upfirdn(taps, padded, down=self.step, axis=0)
-            y = y[(len(taps) - 1 + pad) // self.step : (len(padded) - 1) // self.step + 1]
-        return y.reshape(len(y), *x.shape[1:])
+        taps, count = self.low_pass(), len(self.kept(len(x)))
+        flat = x.reshape(len(x), -1)
+        out = np.zeros((count, flat.shape[1]))
+        # A few rows of the filter's matrix at a time: products of matrices, where sample by sample would be slow.
+        filters = np.zeros((AT_ONCE, (AT_ONCE - 1) * self.step + len(taps)))
+        for i, row in enumerate(filters):
+            row[i * self.step : i * self.step + len(taps)] = taps
+        for first in range(0, count, AT_ONCE):
+            part = flat[first * self.step :][: filters.shape[1]]
+            out[first : first + AT_ONCE] = filters[: count - first, : len(part)] @ part
+        return out.reshape(count, *x.shape[1:])
 
     def kept(self, length: int) -> np.ndarray:
         """Indices of the samples that `apply` keeps."""
