@@ -6,6 +6,8 @@ import numpy as np
 from irb140_jax.effects.base import AbstractEffect, Parameter
 from irb140_jax.effects.native import with_joint
 
+LARGEST = 0.5  # [rad or m]; beyond it first order is wrong, and a person sees it
+
 
 class EncoderOffset(AbstractEffect):
     """q_logged = q + offset: tau(q_logged - offset) - tau(q_logged), to first order, on every joint."""
@@ -29,6 +31,12 @@ class EncoderOffset(AbstractEffect):
 
     def columns(self, motion, joints, shape):
         return -jnp.take(motion.rigid.by_q, joints, axis=2)
+
+    def lowest(self, robot, joints):
+        return np.full(1, -LARGEST)
+
+    def highest(self, robot, joints):
+        return np.full(1, LARGEST)
 
     def physical(self, w, shape):
         return w

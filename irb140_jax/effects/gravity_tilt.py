@@ -7,6 +7,8 @@ from jaxtyping import Array, Float
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
 
+LARGEST = 0.5  # [rad]; beyond it first order is wrong, and a person sees it
+
 
 class GravityTilt(AbstractEffect):
     """Torque of a gravity vector that leans: tau_g(g + g tilt e), e across gravity, in two components."""
@@ -32,6 +34,12 @@ class GravityTilt(AbstractEffect):
 
     def columns(self, motion, joints, shape):
         return jnp.einsum("tng,kg->tnk", motion.rigid.by_gravity, motion.rigid.gravity * motion.rigid.across)
+
+    def lowest(self, robot, joints):
+        return np.full(2, -LARGEST)
+
+    def highest(self, robot, joints):
+        return np.full(2, LARGEST)
 
     def physical(self, w, shape):
         return jnp.hypot(w[0], w[1])[None]

@@ -13,6 +13,7 @@ from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a share of the joint's torque
 LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
 LOOSE_PRIOR = np.log(0.2)  # such a link is rarer than a left-out effect
+FEWEST_ROWS = 40  # of a joint: any explanation fits fewer, and what is left of them is no measure of noise
 BLOCKS = 5  # contiguous blocks per recording: for jackknife intervals, and folds where there is one recording
 
 
@@ -67,10 +68,12 @@ def assemble(lib: Library, stretches: list[Stretch], factor: np.ndarray, uncerta
         uncertainty: Stated relative standard deviation of the inertials.
     """
     nuisances = len(factor)
+    tells = sum(s.use.sum(axis=0) for s in stretches) >= FEWEST_ROWS
     out = []
     for s in stretches:
         theta = s.X[..., :nuisances] @ factor
-        out.append(dataclasses.replace(s, X=np.concatenate([theta, s.X[..., nuisances:], theta], axis=-1)))
+        X = np.concatenate([theta, s.X[..., nuisances:], theta], axis=-1)
+        out.append(dataclasses.replace(s, X=X, use=s.use & tells))
     torque = np.sqrt(np.mean(np.concatenate([s.tau for s in out]) ** 2, axis=0))
     rms = np.sqrt(np.mean(np.concatenate([s.X[..., nuisances : nuisances + lib.size] for s in out]) ** 2, axis=0))
     with np.errstate(divide="ignore"):

@@ -83,6 +83,8 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
                 if power > 0.0:
                     amplitudes[columns] = np.asarray(likely) * REFERENCE_SHARE * np.linalg.norm(torque[joints])
                     amplitudes[columns] /= np.sqrt(power)
+                    most = effect.highest(lib.robot, sites[k // shapes.shape[1]])[part]
+                    amplitudes[columns] *= np.min(np.minimum(most / np.maximum(amplitudes[columns], 1e-300), 1.0))
     return Reference(amplitudes, torque)
 
 
@@ -102,7 +104,7 @@ def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
 def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, int]]:
     """Of every effect at every site: how far it would stand out of the noise, and its candidate.
 
-    Not of those that are named, part of a named one, or were tested against it because they contain it.
+    Not of those that are named or part of a named one.
 
     Args:
         ex: The explanation; inertials and named effects are free.
@@ -149,9 +151,9 @@ def stands_out(
 
 
 def _related(one: AtSite, member: AtSite) -> bool:
-    """Whether an effect is a named one, a part of it, or contains it."""
+    """Whether an effect is a named one or a part of it."""
     a, b = one.effect, member.effect
-    return one.joints == member.joints and (a.slug == b.slug or a.slug in b.contains or b.slug in a.contains)
+    return one.joints == member.joints and (a.slug == b.slug or a.slug in b.contains)
 
 
 def not_testable(robot: Robot, found: set[str], seen: dict[Site, tuple[float, int]]) -> list[dict[str, Any]]:
