@@ -15,7 +15,6 @@ from irb140_jax.errors import InputError
 from irb140_jax.sharding import sweep
 from irb140_jax.swarm.base import Clock, History, Rule, Swarm, recorded
 from irb140_jax.swarm.draws import Draws, Generator
-from irb140_jax.swarm.stored import stored
 from irb140_jax.types import Scalar
 
 # Fitness of a candidate (d,) at a share of the iterations done, t/T.  A pytree: its arrays are inputs of the program.
@@ -91,27 +90,34 @@ def _checked(lower: Any, upper: Any, particles: int, iterations: int) -> tuple[A
 
 
 def _one_seed(key, objective, rule: Rule, lower, upper, particles: int, iterations: int, generator: Generator):
-    """Algorithms 1 and 2 for one swarm."""
-
-    def evaluated(swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
-        candidates = stored(draws.iteration, lambda: rule.candidates(swarm.position, draws))
-        fitness = jax.vmap(objective, (0, None))(lower + (upper - lower) * candidates, clock.progress)
-        return rule.remember(swarm, candidates, jnp.where(jnp.isnan(fitness), jnp.inf, fitness))
+    """Algorithms 1 and 2 for one swarm; the start is the iteration 0 in which nothing moves, to compile it only once."""
 
     def step(swarm: Swarm, iteration: Array):
         clock, draws = Clock(iteration, iterations), Draws(key, iteration, generator)
-        moved = evaluated(rule.move(swarm, clock, draws), clock, draws)
-        return moved, recorded(moved)
+        moved = _moved(rule, swarm, clock, draws)
+        candidates = rule.candidates(moved.position, draws)
+        fitness = jax.vmap(objective, (0, None))(lower + (upper - lower) * candidates, clock.progress)
+        kept = rule.remember(moved, candidates, jnp.where(jnp.isnan(fitness), jnp.inf, fitness))
+        return kept, recorded(kept)
 
-    d = lower.shape[0]
-    clock, draws = Clock(0, iterations), Draws(key, jnp.asarray(0), generator)
-    position, velocity = rule.start(particles, d, draws)
-    nothing = jnp.full(particles, jnp.inf)
-    blank = Swarm(
-        position, velocity, position, nothing, position[0], nothing[0], jnp.full(d, 0.5), jnp.asarray(0),
-        rule.first_memory(particles, d),
-    )  # fmt: skip
-    first = evaluated(blank, clock, draws)
-    last, rest = lax.scan(step, first, jnp.arange(1, iterations + 1))
-    history = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), recorded(first), rest)
+    start = _placed(rule, particles, lower.shape[0], Draws(key, jnp.asarray(0), generator))
+    last, history = lax.scan(step, start, jnp.arange(iterations + 1))
     return Minima(lower + (upper - lower) * last.solution, last.gbest_fitness, history, last)
+
+
+def _placed(rule: Rule, particles: int, unknowns: int, draws: Draws) -> Swarm:
+    """A swarm at its start, not yet evaluated."""
+    position, velocity = rule.start(particles, unknowns, draws)
+    nothing = jnp.full(particles, jnp.inf)
+    return Swarm(
+        position, velocity, position, nothing, position[0], nothing[0], jnp.full(unknowns, 0.5), jnp.asarray(0),
+        rule.first_memory(particles, unknowns),
+    )  # fmt: skip
+
+
+def _moved(rule: Rule, swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
+    """The swarm after its move; at the start, as it is.  What a move leaves alone stays out of the branch, uncopied."""
+    names = ("position", "velocity", "stalled", "memory")
+    parts = lambda swarm: {name: getattr(swarm, name) for name in names}  # noqa: E731
+    move = lambda: parts(rule.move(swarm, clock, draws))  # noqa: E731
+    return swarm.with_(**lax.cond(draws.iteration > 0, move, lambda: parts(swarm)))

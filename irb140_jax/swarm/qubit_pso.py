@@ -65,7 +65,7 @@ class QubitPso(Rule):
         return theta, jnp.zeros_like(theta)
 
     def candidates(self, position: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
-        beta = squared_sine(position)
+        beta = stored(draws.iteration, lambda: squared_sine(position))
         return self.decode(beta if self.one_is_beta else 1.0 - beta, draws)
 
     def remember(self, swarm: Swarm, candidates: Float[Array, "p d"], fitness: Float[Array, " p"]) -> Swarm:
@@ -87,11 +87,9 @@ class QubitPso(Rule):
         stuck = swarm.stalled >= self.patience
         thrown = stuck & (draws.uniforms(3, (shape[0], 1)) < self.share)
 
-        def position() -> Float[Array, "p k"]:
-            throw = self.perturbation * (2.0 * draws.uniforms(2, shape) - 1.0)
-            return jnp.clip(theta + v + jnp.where(thrown, throw, 0.0), self.lowest, self.highest)
-
-        return swarm.at(stored(draws.iteration, position), v, stalled=jnp.where(stuck, 0, swarm.stalled))
+        throw = self.perturbation * (2.0 * draws.uniforms(2, shape) - 1.0)
+        position = jnp.clip(theta + v + jnp.where(thrown, throw, 0.0), self.lowest, self.highest)
+        return swarm.at(position, v, stalled=jnp.where(stuck, 0, swarm.stalled))
 
 
 def squared_sine(theta: Float[Array, "*s"]) -> Float[Array, "*s"]:
