@@ -18,6 +18,7 @@ GOALS = {
     "swarms_run_s": (1.0, "max"),
     "swarms_with_compile_s": (3.0, "max"),
     "swarm_pyswarms_ratio": (10.0, "min"),
+    "swarm_evosax_ratio": (1.0, "min"),
     "swarm_torque_over_distance": (1.5, "max"),
 }
 

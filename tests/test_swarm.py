@@ -168,8 +168,8 @@ def test_the_velocity_clamp_is_respected():
 
 def test_bits_read_as_binary_numbers_of_the_highest_bit_first():
     draws = Draws(jax.random.key(0), jnp.asarray(1))
-    sure = jnp.array([[0.0, 1.0, 1.0, 1.0, 0.0, 0.0], [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]])
-    np.testing.assert_allclose(swarm.Bits(3)(sure, draws), [[3 / 7, 4 / 7], [1.0, 0.0]], rtol=1e-15)
+    sure = jnp.array([[0.0, 1.0, 1.0, 1.0, 0.0, 0.0], [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]]).T
+    np.testing.assert_allclose(swarm.Bits(3)(sure, draws), np.array([[3 / 7, 4 / 7], [1.0, 0.0]]).T, rtol=1e-15)
     assert swarm.Bits(3).angles(27) == 81
 
 
@@ -180,18 +180,18 @@ def test_one_qubit_an_unknown_knows_two_values_only():
 
 def test_collapsed_qubits_are_those_of_the_candidate():
     draws = Draws(jax.random.key(0), jnp.asarray(1))
-    candidates = swarm.Bits(12)(jnp.full((20, 60), 0.5), draws)
+    candidates = swarm.Bits(12)(jnp.full((60, 20), 0.5), draws)
     np.testing.assert_array_equal(swarm.Bits(12)(1.0 * swarm.Bits(12).measured(candidates), draws), candidates)
 
 
 def test_a_qubit_is_measured_as_one_as_often_as_its_amplitude_says():
-    theta = jnp.full((40_000, 1), 0.6)
+    theta = jnp.full((1, 40_000), 0.6)
     bits = swarm.QubitPso(decode=swarm.Bits(1)).candidates(theta, Draws(jax.random.key(3), jnp.asarray(0)))
     assert abs(float(bits.mean()) - np.sin(0.6) ** 2) < 5 * 0.5 / 200  # five standard errors at most
 
 
 def test_the_other_orientation_swaps_ones_and_zeros():
-    theta = jnp.linspace(0.0, 1.5, 7)[:, None]
+    theta = jnp.linspace(0.0, 1.5, 7)[None]
     draws = Draws(jax.random.key(3), jnp.asarray(0))
     sine, cosine = (swarm.QubitPso(one_is_beta=flag).candidates(theta, draws) for flag in (True, False))
     np.testing.assert_allclose(sine + cosine, 1.0, rtol=1e-15)

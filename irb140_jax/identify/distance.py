@@ -15,7 +15,7 @@ Violation = Literal["squared", "absolute"]
 
 
 class Penalty(eqx.Module):
-    """lambda(t) P(x), lambda = weight (offset + t/T)^power ratio^(t/T), P from how far x lies outside the box; by entry.
+    """lambda(t) P(x), lambda = weight (offset + t/T)^power ratio^(t/T), P of how far x lies outside the box; by entry.
 
     The study says that the weight grows with the iterations and punishes bound violations, no more.  Customary forms:
     offset 0, power 1: linear; offset 1, power k: polynomial; power 0, ratio > 1: geometric.  A violation is taken as

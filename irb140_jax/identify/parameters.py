@@ -54,8 +54,8 @@ def phi_of(x: Float[Array, " d"], mass: Float[Array, " k"]) -> Inertials:
         mass: Masses of those links [kg], shape (k,).
     """
     com, inertia = split(x)
-    square = jnp.sum(com**2, axis=1)
-    moved = [square * (i == j) - com[:, i] * com[:, j] for i, j in zip(_ROWS, _COLUMNS, strict=True)]
+    cx, cy, cz = com.T
+    moved = [cy**2 + cz**2, -cx * cy, -cx * cz, cx**2 + cz**2, -cy * cz, cx**2 + cy**2]
     about_origin = inertia + mass[:, None] * jnp.stack(moved, axis=1)
     return jnp.concatenate([mass[:, None], mass[:, None] * com, about_origin], axis=1)
 

@@ -30,7 +30,7 @@ class AdaptiveAttractorQpso(Rule):
     outside: Number = number(0.0)
 
     def move(self, swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
-        particles = len(swarm.position)
+        particles = len(swarm.pbest_fitness)
         fitness = swarm.pbest_fitness
         # Ranks by counting: cheaper to compile than a sort; equal ones in the order of their numbers.
         number_of = jnp.arange(particles)
@@ -40,8 +40,8 @@ class AdaptiveAttractorQpso(Rule):
         rank = jnp.sum(before, axis=1)
         width = jnp.maximum(self.elite * particles * (1.0 - clock.progress), 1e-3)
         weight = jnp.exp(-rank / width)
-        centre = weight @ swarm.pbest / jnp.sum(weight)
+        centre = swarm.pbest @ weight / jnp.sum(weight)
         by_rank = 1.0 + self.tilt * (1.0 - 2.0 * rank / (particles - 1.0))
-        mean = by_rank @ swarm.pbest / particles
+        mean = swarm.pbest @ by_rank / particles
         attractor = lambda: between(swarm.pbest, centre, draws)  # noqa: E731
         return jumped(swarm, attractor, mean, self.contraction(clock), self.outside, draws)

@@ -1,7 +1,8 @@
 """What all swarms share: state, clock, the greedy memory of Algorithms 1 and 2, and what an update rule must say.
 
 A swarm lives in units of its box: 0 is the lower bound of an unknown, 1 the upper.  The rules of the study do not
-change under that scaling, and clamps become fractions of the range.
+change under that scaling, and clamps become fractions of the range.  Particles are along the last axis: a processor
+takes several at a time, and 27 unknowns would leave a remainder.
 """
 
 import abc
@@ -40,9 +41,9 @@ class Swarm(eqx.Module):
     """State of one swarm of p particles with k coordinates each, searching d unknowns (k = d unless it is coded).
 
     Attributes:
-        position: Coordinates of the particles, shape (p, k).
-        velocity: Last step of each particle, shape (p, k).
-        pbest: Coordinates at which each particle did best, shape (p, k).
+        position: Coordinates of the particles, shape (k, p).
+        velocity: Last step of each particle, shape (k, p).
+        pbest: Coordinates at which each particle did best, shape (k, p).
         pbest_fitness: Its fitness there, shape (p,); inf before the first number.
         gbest: Coordinates of the best of all, shape (k,).
         gbest_fitness: Its fitness.
@@ -51,9 +52,9 @@ class Swarm(eqx.Module):
         memory: What else the rule remembers.
     """
 
-    position: Float[Array, "p k"]
-    velocity: Float[Array, "p k"]
-    pbest: Float[Array, "p k"]
+    position: Float[Array, "k p"]
+    velocity: Float[Array, "k p"]
+    pbest: Float[Array, "k p"]
     pbest_fitness: Float[Array, " p"]
     gbest: Float[Array, " k"]
     gbest_fitness: Scalar
@@ -61,7 +62,7 @@ class Swarm(eqx.Module):
     stalled: Int[Array, ""]
     memory: Any = None
 
-    def at(self, position: Float[Array, "p k"], velocity: Float[Array, "p k"], **changes: Any) -> Self:
+    def at(self, position: Float[Array, "k p"], velocity: Float[Array, "k p"], **changes: Any) -> Self:
         """The swarm moved there."""
         return self.with_(position=position, velocity=velocity, **changes)
 
@@ -83,31 +84,31 @@ class Rule(eqx.Module):
         """Number of coordinates of a particle."""
         return unknowns
 
-    def start(self, particles: int, unknowns: int, draws: Draws) -> tuple[Float[Array, "p k"], Float[Array, "p k"]]:
+    def start(self, particles: int, unknowns: int, draws: Draws) -> tuple[Float[Array, "k p"], Float[Array, "k p"]]:
         """Positions and velocities at the start: uniform in the box, at rest."""
-        position = draws.uniforms(0, (particles, self.coordinates(unknowns)))
+        position = draws.uniforms(0, (self.coordinates(unknowns), particles))
         return position, jnp.zeros_like(position)
 
     def first_memory(self, particles: int, unknowns: int) -> Any:
         """`Swarm.memory` at the start."""
         return None
 
-    def candidates(self, position: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
+    def candidates(self, position: Float[Array, "k p"], draws: Draws) -> Float[Array, "d p"]:
         """What is evaluated, in units of the box.  Slots of `draws` from 100."""
         return position
 
-    def remember(self, swarm: Swarm, candidates: Float[Array, "p d"], fitness: Float[Array, " p"]) -> Swarm:
+    def remember(self, swarm: Swarm, candidates: Float[Array, "d p"], fitness: Float[Array, " p"]) -> Swarm:
         """Keep what is better than before, as in lines 10 and 11 of Algorithms 1 and 2."""
         better = fitness < swarm.pbest_fitness
         i = jnp.argmin(fitness)
         improved = fitness[i] < swarm.gbest_fitness
         keep = lambda new, old: jnp.where(improved, new, old)  # noqa: E731
         return swarm.with_(
-            pbest=jnp.where(better[:, None], swarm.position, swarm.pbest),
+            pbest=jnp.where(better, swarm.position, swarm.pbest),
             pbest_fitness=jnp.where(better, fitness, swarm.pbest_fitness),
-            gbest=keep(swarm.position[i], swarm.gbest),
+            gbest=keep(swarm.position[:, i], swarm.gbest),
             gbest_fitness=keep(fitness[i], swarm.gbest_fitness),
-            solution=keep(candidates[i], swarm.solution),
+            solution=keep(candidates[:, i], swarm.solution),
             stalled=keep(0, swarm.stalled + 1),
         )
 
@@ -129,14 +130,15 @@ class History(NamedTuple):
 def recorded(swarm: Swarm) -> History:
     """One entry of the history."""
     spread = jnp.mean(jnp.sqrt(jnp.maximum(_variance(swarm.position), 0.0)))
-    return History(swarm.gbest_fitness, jnp.mean(jnp.abs(swarm.velocity)), spread)
+    speed = jnp.mean(jnp.mean(jnp.abs(swarm.velocity), axis=1))
+    return History(swarm.gbest_fitness, speed, spread)
 
 
-def _variance(x: Float[Array, "p k"]) -> Float[Array, " k"]:
+def _variance(x: Float[Array, "k p"]) -> Float[Array, " k"]:
     """Over the particles, in one pass; about the first of them, so that a swarm drawn together keeps its digits."""
-    y = x - x[0]
-    mean = jnp.mean(y, axis=0)
-    return jnp.mean(y * y, axis=0) - mean * mean
+    y = x - x[:, :1]
+    mean = jnp.mean(y, axis=1)
+    return jnp.mean(y * y, axis=1) - mean * mean
 
 
 def clamped(x: Float[Array, "*s"], limit: Number) -> Float[Array, "*s"]:

@@ -29,8 +29,8 @@ class ConstrictedPso(Rule):
         x, shape = swarm.position, swarm.position.shape
         chi = 2.0 / (2.0 * self.c - 2.0 + jnp.sqrt(4.0 * self.c**2 - 8.0 * self.c))
 
-        def velocity() -> Float[Array, "p d"]:
-            pull = draws.uniforms(0, shape) * (swarm.pbest - x) + draws.uniforms(1, shape) * (swarm.gbest - x)
+        def velocity() -> Float[Array, "d p"]:
+            pull = draws.uniforms(0, shape) * (swarm.pbest - x) + draws.uniforms(1, shape) * (swarm.gbest[:, None] - x)
             return clamped(chi * (swarm.velocity + self.c * pull), self.velocity_limit)
 
         v = stored(draws.iteration, velocity)

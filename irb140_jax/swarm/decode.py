@@ -19,7 +19,7 @@ class Decode(eqx.Module):
         """Number of angles for so many unknowns."""
 
     @abc.abstractmethod
-    def __call__(self, ones: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
+    def __call__(self, ones: Float[Array, "k p"], draws: Draws) -> Float[Array, "d p"]:
         """Candidates, given the probability with which each qubit is measured as 1."""
 
 
@@ -29,7 +29,7 @@ class Amplitude(Decode):
     def angles(self, unknowns: int) -> int:
         return unknowns
 
-    def __call__(self, ones: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
+    def __call__(self, ones: Float[Array, "k p"], draws: Draws) -> Float[Array, "d p"]:
         return ones
 
 
@@ -51,13 +51,14 @@ class Bits(Decode):
     def angles(self, unknowns: int) -> int:
         return unknowns * self.number
 
-    def __call__(self, ones: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
+    def __call__(self, ones: Float[Array, "k p"], draws: Draws) -> Float[Array, "d p"]:
         bits = draws.uniforms(100, ones.shape) < ones
-        weights = 2.0 ** np.arange(self.number - 1, -1, -1) / (2.0**self.number - 1.0)
-        return jnp.where(bits.reshape(len(ones), -1, self.number), weights, 0.0).sum(axis=-1)
+        places = 2.0 ** np.arange(self.number - 1, -1, -1)[:, None]
+        whole = jnp.where(bits.reshape(-1, self.number, ones.shape[1]), places, 0.0).sum(axis=1)
+        return whole / (2.0**self.number - 1.0)  # divided last, as whole numbers are summed without rounding
 
-    def measured(self, candidates: Float[Array, "p d"]) -> Bool[Array, "p k"]:
+    def measured(self, candidates: Float[Array, "d p"]) -> Bool[Array, "k p"]:
         """The bits of these candidates."""
-        whole = jnp.round(candidates * (2.0**self.number - 1.0)).astype(int)[..., None]
-        bits = (whole & 2 ** np.arange(self.number - 1, -1, -1)) > 0
-        return bits.reshape(len(candidates), -1)
+        whole = jnp.round(candidates * (2.0**self.number - 1.0)).astype(int)[:, None]
+        bits = (whole & 2 ** np.arange(self.number - 1, -1, -1)[:, None]) > 0
+        return bits.reshape(-1, candidates.shape[1])

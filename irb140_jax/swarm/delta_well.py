@@ -27,18 +27,18 @@ class DeltaWellQpso(Rule):
 
     def move(self, swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
         attractor = lambda: between(swarm.pbest, swarm.gbest, draws)  # noqa: E731
-        mean = jnp.mean(swarm.pbest, axis=0)
+        mean = jnp.mean(swarm.pbest, axis=1)
         return jumped(swarm, attractor, mean, self.contraction(clock), self.outside, draws)
 
 
-def between(own: Float[Array, "p d"], others: Float[Array, " d"], draws: Draws) -> Float[Array, "p d"]:
+def between(own: Float[Array, "d p"], others: Float[Array, " d"], draws: Draws) -> Float[Array, "d p"]:
     """Random points between each particle's own attractor and the common one; takes slot 0."""
     f = draws.uniforms(0, own.shape)
-    return f * own + (1.0 - f) * others
+    return f * own + (1.0 - f) * others[:, None]
 
 
 def jumped(
-    swarm: Swarm, attractor: Callable[[], Float[Array, "p d"]], mean: Float[Array, " d"], contraction: Scalar,
+    swarm: Swarm, attractor: Callable[[], Float[Array, "d p"]], mean: Float[Array, " d"], contraction: Scalar,
     outside: Number, draws: Draws,
 ) -> Swarm:  # fmt: skip
     """The swarm after a jump drawn from the wells around the attractors; takes slot 1.
@@ -46,9 +46,9 @@ def jumped(
     One number serves for sign and size, as |2u - 1| is again uniform and independent of the sign.
     """
 
-    def position() -> Float[Array, "p d"]:
+    def position() -> Float[Array, "d p"]:
         u = 2.0 * draws.uniforms(1, swarm.position.shape) - 1.0
-        size = contraction * jnp.abs(mean - swarm.position) * -jnp.log(jnp.abs(u))
+        size = contraction * jnp.abs(mean[:, None] - swarm.position) * -jnp.log(jnp.abs(u))
         return jnp.clip(attractor() + jnp.sign(u) * size, -outside, 1.0 + outside)
 
     x = stored(draws.iteration, position)

@@ -29,11 +29,11 @@ class Draws(NamedTuple):
 
         Args:
             slot: Tells apart what is drawn within one iteration; the same slot gives the same numbers again.
-            shape: Their shape.
+            shape: Their shape; numbers are dealt along the first axis first, particle after particle.
         """
         if self.generator == "threefry":
             key = jax.random.fold_in(jax.random.fold_in(self.key, self.iteration), slot)
-            return jax.random.uniform(key, shape, float, minval=jnp.finfo(float).tiny)
+            return jax.random.uniform(key, shape[::-1], float, minval=jnp.finfo(float).tiny).T
         return _hashed(jax.random.key_data(self.key), self.iteration, slot, shape)
 
 
@@ -59,9 +59,9 @@ def _hashed(words: UInt32[Array, "2"], iteration: Array, slot: int, shape: tuple
 
 
 def _counter(shape: tuple[int, ...]) -> UInt32[Array, "..."]:
-    """0, 1, 2, ... in the given shape, without an array in memory."""
+    """0, 1, 2, ... along the first axis first, without an array in memory."""
     count, stride = jnp.zeros(shape, jnp.uint32), 1
-    for axis in reversed(range(len(shape))):
+    for axis in range(len(shape)):
         count = count + jnp.uint32(stride) * lax.broadcasted_iota(jnp.uint32, shape, axis)
         stride *= shape[axis]
     return count

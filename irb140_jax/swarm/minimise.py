@@ -90,13 +90,13 @@ def _checked(lower: Any, upper: Any, particles: int, iterations: int) -> tuple[A
 
 
 def _one_seed(key, objective, rule: Rule, lower, upper, particles: int, iterations: int, generator: Generator):
-    """Algorithms 1 and 2 for one swarm; the start is the iteration 0 in which nothing moves, to compile it only once."""
+    """Algorithms 1 and 2 for one swarm; its start is iteration 0, in which nothing moves: compiled once."""
 
     def step(swarm: Swarm, iteration: Array):
         clock, draws = Clock(iteration, iterations), Draws(key, iteration, generator)
         moved = _moved(rule, swarm, clock, draws)
         candidates = rule.candidates(moved.position, draws)
-        fitness = jax.vmap(objective, (0, None))(lower + (upper - lower) * candidates, clock.progress)
+        fitness = jax.vmap(objective, (1, None))(lower[:, None] + (upper - lower)[:, None] * candidates, clock.progress)
         kept = rule.remember(moved, candidates, jnp.where(jnp.isnan(fitness), jnp.inf, fitness))
         return kept, recorded(kept)
 
@@ -110,7 +110,7 @@ def _placed(rule: Rule, particles: int, unknowns: int, draws: Draws) -> Swarm:
     position, velocity = rule.start(particles, unknowns, draws)
     nothing = jnp.full(particles, jnp.inf)
     return Swarm(
-        position, velocity, position, nothing, position[0], nothing[0], jnp.full(unknowns, 0.5), jnp.asarray(0),
+        position, velocity, position, nothing, position[:, 0], nothing[0], jnp.full(unknowns, 0.5), jnp.asarray(0),
         rule.first_memory(particles, unknowns),
     )  # fmt: skip
 

@@ -34,23 +34,23 @@ class NoiseResilientQpso(Rule):
 
     def move(self, swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
         attractor = lambda: between(swarm.pbest, swarm.gbest, draws)  # noqa: E731
-        mean = jnp.mean(swarm.pbest, axis=0)
+        mean = jnp.mean(swarm.pbest, axis=1)
         moved = jumped(swarm, attractor, mean, self.contraction(clock), self.outside, draws)
-        again = draws.uniforms(2, (len(swarm.position),)) < self.again
-        x = jnp.where(again[:, None], swarm.pbest, moved.position)
+        again = draws.uniforms(2, swarm.pbest_fitness.shape) < self.again
+        x = jnp.where(again, swarm.pbest, moved.position)
         return swarm.at(x, x - swarm.position, memory=(swarm.memory[0], again))
 
-    def remember(self, swarm: Swarm, candidates: Float[Array, "p d"], fitness: Float[Array, " p"]) -> Swarm:
+    def remember(self, swarm: Swarm, candidates: Float[Array, "d p"], fitness: Float[Array, " p"]) -> Swarm:
         count, again = swarm.memory
         known = jnp.where(count > 0, swarm.pbest_fitness, 0.0)
         mean = jnp.where(jnp.isfinite(fitness), (count * known + fitness) / (count + 1.0), swarm.pbest_fitness)
         better = ~again & (fitness < swarm.pbest_fitness)
-        pbest = jnp.where(better[:, None], swarm.position, swarm.pbest)
+        pbest = jnp.where(better, swarm.position, swarm.pbest)
         pbest_fitness = jnp.where(better, fitness, jnp.where(again, mean, swarm.pbest_fitness))
         count = jnp.where(better, 1.0, count + again)
         i = jnp.argmin(pbest_fitness)
         improved = pbest_fitness[i] < swarm.gbest_fitness
         return swarm.with_(
-            pbest=pbest, pbest_fitness=pbest_fitness, gbest=pbest[i], gbest_fitness=pbest_fitness[i],
-            solution=pbest[i], stalled=jnp.where(improved, 0, swarm.stalled + 1), memory=(count, again),
+            pbest=pbest, pbest_fitness=pbest_fitness, gbest=pbest[:, i], gbest_fitness=pbest_fitness[i],
+            solution=pbest[:, i], stalled=jnp.where(improved, 0, swarm.stalled + 1), memory=(count, again),
         )  # fmt: skip

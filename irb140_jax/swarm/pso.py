@@ -33,15 +33,15 @@ class Pso(Rule):
     start_speed: Number = number(0.0)
 
     def start(self, particles: int, unknowns: int, draws: Draws):
-        shape = (particles, unknowns)
+        shape = (unknowns, particles)
         return draws.uniforms(0, shape), self.start_speed * (2.0 * draws.uniforms(1, shape) - 1.0)
 
     def move(self, swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
         x, shape = swarm.position, swarm.position.shape
 
-        def velocity() -> Float[Array, "p d"]:
+        def velocity() -> Float[Array, "d p"]:
             own = self.c1 * draws.uniforms(0, shape) * (swarm.pbest - x)
-            social = self.c2 * draws.uniforms(1, shape) * (swarm.gbest - x)
+            social = self.c2 * draws.uniforms(1, shape) * (swarm.gbest[:, None] - x)
             return clamped(self.inertia(clock) * swarm.velocity + own + social, self.velocity_limit)
 
         v = stored(draws.iteration, velocity)

@@ -61,14 +61,14 @@ class QubitPso(Rule):
         return self.decode.angles(unknowns)
 
     def start(self, particles: int, unknowns: int, draws: Draws):
-        theta = self.spread * draws.uniforms(0, (particles, self.coordinates(unknowns)))
+        theta = self.spread * draws.uniforms(0, (self.coordinates(unknowns), particles))
         return theta, jnp.zeros_like(theta)
 
-    def candidates(self, position: Float[Array, "p k"], draws: Draws) -> Float[Array, "p d"]:
+    def candidates(self, position: Float[Array, "k p"], draws: Draws) -> Float[Array, "d p"]:
         beta = stored(draws.iteration, lambda: squared_sine(position))
         return self.decode(beta if self.one_is_beta else 1.0 - beta, draws)
 
-    def remember(self, swarm: Swarm, candidates: Float[Array, "p d"], fitness: Float[Array, " p"]) -> Swarm:
+    def remember(self, swarm: Swarm, candidates: Float[Array, "d p"], fitness: Float[Array, " p"]) -> Swarm:
         if not self.collapse or not isinstance(self.decode, Bits):
             return super().remember(swarm, candidates, fitness)
         theta = jnp.where(self.decode.measured(candidates) == self.one_is_beta, 0.5 * jnp.pi, 0.0)
@@ -78,14 +78,14 @@ class QubitPso(Rule):
     def move(self, swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
         theta, shape = swarm.position, swarm.position.shape
 
-        def velocity() -> Float[Array, "p k"]:
+        def velocity() -> Float[Array, "k p"]:
             own = self.c1 * draws.uniforms(0, shape) * (swarm.pbest - theta)
-            social = self.c2 * draws.uniforms(1, shape) * (swarm.gbest - theta)
+            social = self.c2 * draws.uniforms(1, shape) * (swarm.gbest[:, None] - theta)
             return clamped(self.inertia(clock) * swarm.velocity + own + social, self.velocity_limit)
 
         v = stored(draws.iteration, velocity)
         stuck = swarm.stalled >= self.patience
-        thrown = stuck & (draws.uniforms(3, (shape[0], 1)) < self.share)
+        thrown = stuck & (draws.uniforms(3, (shape[1],)) < self.share)
 
         throw = self.perturbation * (2.0 * draws.uniforms(2, shape) - 1.0)
         position = jnp.clip(theta + v + jnp.where(thrown, throw, 0.0), self.lowest, self.highest)

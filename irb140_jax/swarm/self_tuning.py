@@ -37,9 +37,9 @@ class SelfTuningQpso(Rule):
 
     def move(self, swarm: Swarm, clock: Clock, draws: Draws) -> Swarm:
         attractor = lambda: between(swarm.pbest, swarm.gbest, draws)  # noqa: E731
-        return jumped(swarm, attractor, jnp.mean(swarm.pbest, axis=0), jnp.exp(swarm.memory), self.outside, draws)
+        return jumped(swarm, attractor, jnp.mean(swarm.pbest, axis=1), jnp.exp(swarm.memory), self.outside, draws)
 
-    def remember(self, swarm: Swarm, candidates: Float[Array, "p d"], fitness: Float[Array, " p"]) -> Swarm:
+    def remember(self, swarm: Swarm, candidates: Float[Array, "d p"], fitness: Float[Array, " p"]) -> Swarm:
         share = jnp.mean((fitness < swarm.pbest_fitness).astype(float))
         first = jnp.isinf(swarm.gbest_fitness)  # at the start everything is an improvement
         tuned = swarm.memory + jnp.where(first, 0.0, self.gain * (share - self.target))
