@@ -153,7 +153,8 @@ def judged(kind: Kind, seed: int) -> dict:
     told = {e["effect"] for e in case.truth["effects"]} & set(CATALOGUE)
     oracle = None
     if kind == "single" and told:
-        oracle = diagnose(robot, recordings, DiagnoseConfig(effects=tuple(CATALOGUE[s] for s in told))).diagnosis["fit"]
+        oracle = diagnose(robot, recordings, DiagnoseConfig(effects=tuple(CATALOGUE[s] for s in told))).diagnosis
+        oracle = {"fit": oracle["fit"], "found": oracle["findings"]}
     return {
         "seed": seed, "row": row, "joints_of_robot": robot.n, "truth": case.truth["effects"], "found": d["findings"],
         "verdict": d["verdict"], "unexplained": d["unexplained"], "fit": d["fit"], "oracle": oracle,
