@@ -183,7 +183,11 @@ def main() -> None:
         for seed in range(config.first, config.last + 1):
             if seed in done:
                 continue
-            case = judged(config.kind, seed)
+            try:
+                case = judged(config.kind, seed)
+            except InputError as error:
+                print(f"left out: {config.kind} {seed}: {error}", flush=True)
+                continue
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(case) + "\n")
             print(trials_report.line_of(case), flush=True)

@@ -198,6 +198,15 @@ def test_parameters_already_fitted_make_the_noise_larger():
     assert with_fit.total[0, 0] / without.total[0, 0] == pytest.approx(np.sqrt(1000 / 640))
 
 
+def test_noise_is_no_smaller_than_a_slow_residual_with_gaps():
+    t = np.arange(1500)
+    x = (np.sin(2e-3 * t) + 1e-4 * a_noise_of([0.0], 1500)[:, 0])[:, None]
+    for seed in range(20):
+        use = np.repeat(np.random.default_rng(seed).random(75) < 0.5, 20)[:, None]
+        noise = noise_from_residuals([x], [use], np.zeros(1))
+        assert noise.level[0, 0] >= 0.99 * noise.total[0, 0]
+
+
 def test_rows_that_do_not_count_do_not_enter_the_noise():
     x = a_noise_of([0.6], 5000)
     use = np.ones(x.shape, dtype=bool)

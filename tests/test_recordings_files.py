@@ -142,6 +142,13 @@ def test_a_few_missing_values_are_interpolated_and_stated(frame, sound, robot, t
     assert "q.elbow: 3 missing values filled by interpolation, the first at row 41" in again.notes
 
 
+def test_a_number_beyond_all_reason_counts_as_missing(frame, robot, tmp_path):
+    frame.loc[40, "tau.elbow"] = 1e30
+    again = read_recording(written(frame, tmp_path), robot)
+    assert np.abs(again.tau).max() < 1e3
+    assert "tau.elbow: 1 missing value filled by interpolation, the first at row 41" in again.notes
+
+
 def test_many_missing_values_are_refused(frame, robot, tmp_path):
     frame.loc[200:260, "tau.elbow"] = np.nan
     message = refusal(written(frame, tmp_path), robot)

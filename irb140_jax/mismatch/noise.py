@@ -95,6 +95,7 @@ def _whitener(acov: np.ndarray) -> tuple[np.ndarray, float]:
     response = np.abs(np.fft.rfft(a, SPECTRUM)) ** 2
     rising = np.maximum.accumulate(variance / response)
     acov = np.fft.irfft(rising, SPECTRUM)[: ORDER + 1]
+    acov = acov * max(1.0, 1.0 / acov[0])  # over gaps, autocovariances may belong to no spectrum; never less than seen
     a, variance = _yule_walker(acov)
     return a, float(np.sqrt(variance))
 

@@ -28,8 +28,8 @@ MOTION_BLOCK = 2.5  # s left out together
 RIDGES = (0.001, 0.03, 1.0)  # of the features' variance; the best one counts, in the null as well
 TIME_BAND = 1.0  # Hz up to which the competitor of time follows
 TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
-BELITTLED = 0.5  # a finding smaller than this many times its joint's nameless structure may be a part of that
-NO_WORSE = 1.1  # ratio of unseen errors below which the structure's competitor can do without such a finding
+BELITTLED = 0.2  # size of a nameless structure, over that of a finding, from which the finding may be a part of it ...
+NO_WORSE = 0.2  # ... if its competitor errs by at most so much more without the finding, times that ratio
 BETTER = 0.95  # and without any finding: where it distorts what is simple without it
 ALMOST_ALL = 0.8
 NEARLY = 2.0 / 3.0
@@ -267,9 +267,9 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
     out, y = [], rows.residual
     for index in sorted(torques, key=lambda i: float(np.sum(torques[i] ** 2))):
         without = y + torques[index] / rows.level
-        small = np.sqrt(np.mean(torques[index] ** 2)) * BELITTLED < size
+        ratio = size / np.sqrt(np.mean(torques[index] ** 2))
         error = _missed(carrier, without[:, None])[0] / _missed(carrier, y[:, None])[0]
-        if error < BETTER or (small and error < NO_WORSE):
+        if error < BETTER or (ratio > BELITTLED and error < 1.0 + NO_WORSE * min(ratio, 1.0)):
             out.append(index)
             y = without
     return tuple(out)

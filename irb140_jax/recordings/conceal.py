@@ -118,7 +118,7 @@ def conceal(
         The case.
 
     Raises:
-        InputError: Unknown effect, joint or parameter.
+        InputError: Unknown effect, joint or parameter, or effects with which the loop is unstable.
     """
     spec = arm_spec(mjcf)
     robot = robot_from_model(spec.compile(), source=str(mjcf)[:80])

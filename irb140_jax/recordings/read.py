@@ -63,6 +63,7 @@ def unchecked_recording(
     file_t = table["t"]
     rows = np.arange(1, len(file_t) + 1)
     table, rows = repair.without_repeated_rows(table, rows, notes)
+    table = repair.without_absurd_values(table, used)
     table, rows = repair.without_missing_ends(table, used, rows, notes)
     table = repair.with_coarse_times_spread(table, notes)
     check_times(table["t"], rows, path, notes)

@@ -10,6 +10,7 @@ from irb140_jax.recordings.recording import Recording
 
 MAX_MISSING_SHARE = 0.01  # of a column's values; beyond it, interpolation would write a part of the measurement
 MAX_GAP_ROWS = 10  # rows; at usual rates 10 to 50 ms, well below the periods at which arms move
+LARGEST = 1e9  # no joint turns so far and no motor pulls so much: a broken number, as good as none
 LEAST_REPEATED = 0.2  # of the time stamps that repeat the one before; fewer are rows out of order, not a coarse clock
 LONGEST_TICK = 0.1  # s; within a longer one, motion can't be told from its spreading
 MAX_ENDS_SHARE = 0.05  # of the rows that may be cut off at either end because a channel started late
@@ -28,6 +29,12 @@ def without_repeated_rows(table: Table, rows: np.ndarray, notes: list[str]) -> t
         notes.append(f"{_count(repeated.sum(), 'row')} repeating the row before in every column, the first at row "
                      f"{rows[repeated][0]}, left out")
     return {name: values[~repeated] for name, values in table.items()}, rows[~repeated]
+
+
+def without_absurd_values(table: Table, used: list[str]) -> Table:
+    """Values of the used channels beyond `LARGEST` as missing ones."""
+    absurd = lambda values: np.abs(values) > LARGEST  # noqa: E731
+    return table | {name: np.where(absurd(table[name]), np.nan, table[name]) for name in used if name != "t"}
 
 
 def without_missing_ends(
@@ -98,13 +105,13 @@ def with_gaps_filled(
             raise RecordingError(f"{path}: column t, row {first}: the time is missing; every row needs a time, delete "
                                  "the row")
         if bad.all():
-            raise RecordingError(f"{path}: column {name} holds no finite value; log this channel, or check the "
-                                 "column's name")
+            raise RecordingError(f"{path}: column {name} holds no finite value below {LARGEST:g}; log this channel, or "
+                                 "check the column's name")
         if not few_missing(table[name]):
             raise RecordingError(
-                f"{path}: column {name}: {bad.sum()} of {len(bad)} values are NaN, infinite or empty, the first at row "
-                f"{first}, up to {gap} rows in a row; allowed is {MAX_MISSING_SHARE:.0%} and {MAX_GAP_ROWS} rows in a "
-                "row: cut the recording there, or drop the rows")
+                f"{path}: column {name}: {bad.sum()} of {len(bad)} values are NaN, infinite, beyond {LARGEST:g} or "
+                f"empty, the first at row {first}, up to {gap} rows in a row; allowed is {MAX_MISSING_SHARE:.0%} and "
+                f"{MAX_GAP_ROWS} rows in a row: cut the recording there, or drop the rows")
         index = np.arange(len(bad))
         at = table["t"] if np.isfinite(table["t"]).all() else index
         filled[name] = np.where(bad, np.interp(at, at[~bad], table[name][~bad]), table[name])

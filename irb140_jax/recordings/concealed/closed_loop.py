@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from irb140_jax.errors import InputError
 from irb140_jax.recordings.concealed.hidden import Hidden, Log, Plant
 from irb140_jax.recordings.excite import Excitation
 
@@ -32,6 +33,9 @@ def closed_loop(
 
     Returns:
         The log, T samples.
+
+    Raises:
+        InputError: The loop is unstable.
     """
     n, before = nominal.nv, round(SETTLING / true.opt.timestep)
     steps = before + motion.t.size
@@ -67,6 +71,10 @@ def closed_loop(
         # What accelerates and carries the links is what the gear transmitted: applied torque less friction.
         plant.load = (data.qfrc_applied + data.qfrc_passive + data.qfrc_constraint)[dofs]
     qd[steps] = data.qvel[dofs]
+    if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.isfinite(tau).all():
+        raise InputError(
+            f"motion {motion.name!r}: the closed loop becomes unstable; hide less, or sample the motion finer"
+        )
     log = Log(motion.t, q[before:], qd[before:-1], np.diff(qd[before:], axis=0) / plant.dt, tau[before:])
     for effect in hidden:
         log = effect.measured(log)
