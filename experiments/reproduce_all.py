@@ -66,7 +66,8 @@ class Step:
 def steps(config: Config, arm: StudyArm) -> list[Step]:
     """All parts, in the order in which they need each other."""
     folder, figures = config.folder(arm), config.figure_folder(arm)
-    shared = {"robot": config.robot, "joints": config.joints, "smoke": config.smoke, "out": folder, "figures": figures}
+    shared = {name: getattr(config, name) for name in ("robot", "joints", "smoke", "devices")}
+    shared |= {"out": folder, "figures": figures}
     found, so_far = [], f"{arm.name} {arm.x.tolist()}"
     for title, module, results, pictures in (
         ("tables 1 and 2: the arm", tables_1_2_arm, ("tables_1_2",), ()),

@@ -9,8 +9,10 @@ import re
 from functools import cached_property
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.sharding import Mesh
 from jaxtyping import Array, Float
 
 from irb140_jax import identify
@@ -126,11 +128,24 @@ class StudyConfig(ArmChoice):
         out: Folder of the results; default results/, and a folder in it for another arm or a smoke run.
         figures: Folder of the figures; default docs/figures for the study's arm, else within the results.
         smoke: Everything as small as can be, to see that all works.
+        devices: Among which tables 3 and 4 share their seeds; docs/scaling.md says how a CPU has several.
     """
 
     out: pathlib.Path | None = None
     figures: pathlib.Path | None = None
     smoke: bool = False
+    devices: int = 1
+
+    @property
+    def mesh(self) -> Mesh | None:
+        """These devices; None for the one that is taken anyway."""
+        there = len(jax.devices())
+        if not 1 <= self.devices <= there:
+            raise InputError(
+                f"--devices {self.devices}: this process has {there}; give 1 to {there}, or start it with "
+                f"XLA_FLAGS=--xla_force_host_platform_device_count={self.devices}"
+            )
+        return jax.make_mesh((self.devices,), ("lanes",)) if self.devices > 1 else None
 
     def folder(self, arm: StudyArm) -> pathlib.Path:
         """Where results go; it is made."""
@@ -148,6 +163,6 @@ class StudyConfig(ArmChoice):
 
     def said(self) -> dict[str, str | int | float | bool | None]:
         """The choices that a result depends on, to be stored beside it."""
-        places = ("out", "figures")
-        told = {name: value for name, value in vars(self).items() if name not in places}
+        of_no_matter = ("out", "figures", "devices")
+        told = {name: value for name, value in vars(self).items() if name not in of_no_matter}
         return {name: str(value) if isinstance(value, pathlib.Path) else value for name, value in told.items()}

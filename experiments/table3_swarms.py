@@ -2,6 +2,7 @@
 
     python experiments/table3_swarms.py                              # the study's arm, some 2300 readings
     python experiments/table3_swarms.py --robot arm.xml [--joints n] # any other arm, the usual readings
+    python experiments/table3_swarms.py --devices 2                  # seeds shared among two devices
     python experiments/table3_swarms.py --smoke                      # seconds
 
 Readings are appended to table3_swarms.jsonl as they are done, so an interrupted run goes on where it stopped.  Writes
@@ -19,6 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 import tyro
 from figures_swarms import draw
+from jax.sharding import Mesh
 from study_arm import StudyArm, StudyConfig
 from study_readings import ITERATIONS, PARTICLES, SEEDS, Reading, all_readings, objective, rule, usual_readings
 from table3_report import page, summary
@@ -45,21 +47,21 @@ class Config(StudyConfig):
 FULL = {"particles": PARTICLES, "iterations": ITERATIONS, "seeds": SEEDS}
 
 
-def minima(reading: Reading, arm: StudyArm, particles: int, iterations: int, seeds: int) -> swarm.Minima:
+def minima(reading: Reading, arm: StudyArm, size: dict[str, int], mesh: Mesh | None = None) -> swarm.Minima:
     """All seeds of a reading; x holds the unknowns."""
     aim = objective(reading, arm)
-    keys = swarm.seed_keys(seeds)
     return swarm.minimise(
-        aim, rule(reading), aim.lower, aim.upper, keys=keys, particles=particles, iterations=iterations
-    )
+        aim, rule(reading), aim.lower, aim.upper, keys=swarm.seed_keys(size["seeds"]), particles=size["particles"],
+        iterations=size["iterations"], mesh=mesh,
+    )  # fmt: skip
 
 
 consistent = jax.jit(jax.vmap(identify.consistency, (0, None)))
 
 
-def judged(reading: Reading, arm: StudyArm, size: dict[str, int]) -> dict:
+def judged(reading: Reading, arm: StudyArm, size: dict[str, int], mesh: Mesh | None = None) -> dict:
     """One row: errors by equation 30, fitness, plateau, share of possible bodies."""
-    found = jax.block_until_ready(minima(reading, arm, **size))
+    found = jax.device_get(minima(reading, arm, size, mesh))
     x = arm.full(found.x)
     com, inertia = arm.mape(np.asarray(x))
     fitness, curves = np.asarray(found.fitness), np.asarray(found.history.best)
@@ -80,12 +82,12 @@ def run(config: Config, arm: StudyArm) -> list[dict]:
     """Judge the readings that the file of results lacks; all rows."""
     path = config.folder(arm) / "table3_swarms.jsonl"
     rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    done, readings = {row["name"] for row in rows}, config.readings(arm)
+    done, readings, mesh = {row["name"] for row in rows}, config.readings(arm), config.mesh
     started = time.perf_counter()
     for number, reading in enumerate(readings):
         if str(reading) in done:
             continue
-        rows.append(judged(reading, arm, config.size))
+        rows.append(judged(reading, arm, config.size, mesh))
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(rows[-1]) + "\n")
         if number % 100 == 0 or number == len(readings) - 1:
@@ -131,7 +133,7 @@ def pair_of_sets(pair: dict[str, str], arm: StudyArm, size: dict[str, int]) -> d
         "reference": np.asarray(arm.x).tolist(), "searched": arm.searched.tolist(), "sets": {}, "runs": {},
     }  # fmt: skip
     for family, name in pair.items():
-        found = jax.block_until_ready(minima(by_name[name], arm, **size))
+        found = jax.block_until_ready(minima(by_name[name], arm, size))
         x = np.asarray(arm.full(found.x))
         com, inertia = arm.mape(x)
         told["sets"][family.upper()] = x.tolist()

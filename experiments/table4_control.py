@@ -3,6 +3,7 @@
     python experiments/table4_control.py                  # three joints, as in the study; some minutes
     python experiments/table4_control.py --joints 6       # the whole arm
     python experiments/table4_control.py --robot arm.xml  # any other arm; with the boundary layer only
+    python experiments/table4_control.py --devices 2      # runs shared among two devices
     python experiments/table4_control.py --smoke          # a minute
 
 The identified sets are those that table3_swarms.py of the same arm stored.  Every reading is stored when it is done; an
@@ -14,6 +15,7 @@ import hashlib
 import itertools
 import json
 import pathlib
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -148,11 +150,12 @@ def motion_of(config: Config, arm: Robot) -> tuple[control.Reference, str]:
 
 
 def runs_of(config: Config, task: Task, law: tuple):
-    """A function of plant, model and disturbance that runs one lane and reads everything off it."""
+    """A function of (plant, model, push, share), lanes first, that runs them and reads everything off them."""
     arm, reference = task.arm, task.reference
     wanted = reference.q[:-1]
 
-    def one(plant, model, push, share):
+    def one(lane):
+        plant, model, push, share = lane
         controller = control.sliding_mode(with_set(arm, *model), gain=task.gain, switching=law[0], form=law[1])
         disturbance = simulate.SinusoidalTorque(push, share, jnp.asarray(config.frequency), jnp.zeros(()))
         run = simulate.rollout(with_set(arm, *plant), controller, reference, disturbance, q0=task.start)
@@ -172,17 +175,17 @@ def runs_of(config: Config, task: Task, law: tuple):
         traces = {"q": run.q[::THIN], "tau": run.tau[::THIN], "energy": absolute[::THIN], "tool": path}
         return measures, traces
 
-    return jax.jit(jax.vmap(one))
+    return partial(simulate.sweep, one, mesh=config.mesh)
 
 
 def lanes(sets: dict, side: str, arm: Robot, push: np.ndarray, share: np.ndarray) -> tuple:
-    """Arguments of every lane, in the order model, seed, condition."""
+    """Plant, model, push and share of every lane, in the order model, seed, condition."""
     com, inertia = (np.concatenate([sets[m][k] for m in MODELS]) for k in (0, 1))
     found = np.repeat(com, 2, axis=0), np.repeat(inertia, 2, axis=0)
     true = tuple(np.broadcast_to(np.asarray(x), y.shape) for x, y in zip((arm.com, arm.inertia), found, strict=True))
     plant, model = (found if side in (part, "both") else true for part in ("plant", "controller"))
     on = np.tile([0.0, 1.0], len(com))[:, None]
-    return plant, model, on * push, on * share
+    return jax.tree.map(jnp.asarray, (plant, model, on * push, on * share))
 
 
 def by_mujoco(config: Config, task: Task, args: tuple, lane: int, switching: str) -> np.ndarray:
@@ -239,7 +242,7 @@ def _reading(config: Config, task: Task, compiled, sets: dict, reading: tuple[st
     (side, kind, law), none = reading, np.zeros(task.arm.n)
     push, share = (config.share * task.peak, none) if kind == "of peak" else (none, none + config.share)
     args = lanes(sets, side, task.arm, push, share)
-    measures, traces = jax.block_until_ready(compiled(*args))
+    measures, traces = jax.block_until_ready(compiled(args))
     by = lambda x: np.asarray(x).reshape(len(MODELS), config.seeds, 2, *x.shape[1:])  # noqa: E731
     store = {f"measure_{key}": by(value) for key, value in measures.items()}
     apart = by(traces["tau"]) - by(traces["tau"])[:1]

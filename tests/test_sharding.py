@@ -48,15 +48,56 @@ except InputError as error:
 """
 
 
-def test_swarms_and_rollouts_are_the_same_on_one_and_on_four_devices():
-    env = os.environ | {"XLA_FLAGS": "--xla_force_host_platform_device_count=4", "JAX_PLATFORMS": "cpu"}
+STUDY_ON_TWO_DEVICES = """
+import sys
+sys.path.insert(0, "experiments")
+import jax, numpy as np
+import table3_swarms, table4_control
+from irb140_jax.errors import InputError
+from study_readings import Reading
+
+one, two = (table3_swarms.Config(devices=n) for n in (1, 2))
+assert one.said() == two.said()
+size = dict(particles=6, iterations=3, seeds=4)
+rows = [table3_swarms.judged(Reading("pso"), one.arm(), size, config.mesh) for config in (one, two)]
+assert rows[0] == rows[1]
+
+one, two = (table4_control.Config(seeds=1, duration=5.0, dt=0.002, devices=n) for n in (1, 2))
+arm = table4_control.arm_of(one, one.arm())
+sets = {model: (np.asarray(arm.com)[None], np.asarray(arm.inertia)[None]) for model in table4_control.MODELS}
+task = table4_control.task_of(one, arm)
+args = table4_control.lanes(sets, "both", arm, 0.4 * task.peak, 0.0 * task.peak)
+alone, shared = (table4_control.runs_of(c, task, table4_control.LAWS[0])(args) for c in (one, two))
+assert len(shared[1]["q"].sharding.device_set) == 2
+# To rounding: three lanes a device and six on one leave different remainders in a processor's vectors.
+jax.tree.map(lambda a, b: np.testing.assert_allclose(b, a, rtol=1e-10, atol=1e-10), alone, shared)
+
+try:
+    table3_swarms.Config(devices=3).mesh
+except InputError as error:
+    print(error)
+"""
+
+
+def said_on(devices: int, script: str) -> str:
+    """What a script says where the processor counts as so many devices; it must end well."""
+    env = os.environ | {"XLA_FLAGS": f"--xla_force_host_platform_device_count={devices}", "JAX_PLATFORMS": "cpu"}
     done = subprocess.run(
-        [sys.executable, "-c", ON_FOUR_DEVICES], env=env, capture_output=True, text=True, timeout=300,
+        [sys.executable, "-c", script], env=env, capture_output=True, text=True, timeout=300,
         cwd=pathlib.Path(__file__).parents[1],
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "6 lanes on 4 devices" in done.stdout
-    assert "multiple of 4" in done.stdout
+    return done.stdout
+
+
+def test_swarms_and_rollouts_are_the_same_on_one_and_on_four_devices():
+    said = said_on(4, ON_FOUR_DEVICES)
+    assert "6 lanes on 4 devices" in said
+    assert "multiple of 4" in said
+
+
+def test_the_study_s_tables_are_the_same_on_one_and_on_two_devices():
+    assert "this process has 2; give 1 to 2" in said_on(2, STUDY_ON_TWO_DEVICES)
 
 
 def test_a_lane_is_as_if_alone():
