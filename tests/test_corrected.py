@@ -81,8 +81,9 @@ def test_the_jax_model_gives_the_torque_that_predict_gives_with_every_effect_at_
     assert len(AT_ONCE) > 15
     fitted = torques_along(everything, as_conditioned(m)).corrected
     tau = torque_along(corrected_robot(everything), m)
-    # The fit differentiates the rigid body by differences of 1e-5, JAX exactly; play has no slope at the end.
-    np.testing.assert_allclose(tau[:-2], fitted[:-2], rtol=0, atol=1e-6 * np.abs(fitted).max())
+    # The fit differentiates the rigid body by differences of 1e-5, JAX exactly; play has no slope at the end,
+    # and a delay looks a row ahead.
+    np.testing.assert_allclose(tau[:-3], fitted[:-3], rtol=0, atol=1e-6 * np.abs(fitted).max())
 
 
 INSTANT = ("viscous_friction", "load_dependent_friction", "thermal_friction_drift", "torque_gain")

@@ -226,6 +226,10 @@ class AbstractEffect(abc.ABC):
         del robot
         return np.ones(len(self.own))
 
+    def blur(self) -> np.ndarray:
+        """Standard deviation below which each physical parameter has no meaning, shape (p,)."""
+        return np.zeros(len(self.parameters))
+
     def memory(self, q: Float[Array, " m"], tau: Float[Array, " m"]) -> Float[Array, " s"]:
         """What it remembers after standing still at q, positions of the site, under the torque tau."""
         del q, tau

@@ -9,6 +9,7 @@ from scipy import optimize
 from irb140_jax.effects.base import AbstractEffect, Parameter
 
 RISE = 0.05  # s in which a push begins and ends
+BLUR = 0.03  # s: standard deviation of when a push begins, whatever its rise
 EDGES = 32  # instants per recording at which a push may begin or end in the first scan
 LONGEST = 0.4  # of a recording; what lasts longer is no event
 SHORTEST = 0.2  # s; what lasts less is a blow, or a misfit
@@ -92,6 +93,9 @@ class ExternalWrench(AbstractEffect):
 
     def physical(self, w, shape):
         return jnp.concatenate([shape, w])
+
+    def blur(self):
+        return np.array([BLUR, BLUR, 0.0, 0.0, 0.0, 0.0])  # a push has no sharper beginning and end
 
     def amplitudes(self, values):
         shape = [values[k] for k in ("t0", "t1", "recording")]

@@ -1,16 +1,24 @@
 """Time delay: torque and position channels of the log are out of step."""
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
 
+HALVES = (-0.016, -0.008, 0.0, 0.008, 0.016)  # s: half of the delays that are tried; first order serves between them
+
 
 class TimeDelay(AbstractEffect):
-    """q_logged(t) = q(t - delay): the logged torque belongs to a later motion, tau + delay d tau/dt."""
+    """q_logged(t) = q(t - delay): the logged torque belongs to a later motion, tau(t + delay).
+
+    tau(t + delay) - tau(t) is delay times the slope at t + delay/2, right to third order in frequency times delay; the
+    shape is where the slope is taken.
+    """
 
     slug = "time_delay"
     title = "torque and position out of step"
-    equation = "delay d tau/dt on every joint"
+    equation = "tau(t + delay) - tau(t) on every joint"
     source = "Ljung, System Identification, 1999, ch. 4"
     parameters = (Parameter("delay", "s"),)
     variants = ((0,),)
@@ -26,14 +34,18 @@ class TimeDelay(AbstractEffect):
     def sites(self, robot):
         return np.arange(robot.n)[None, :]
 
+    def shapes(self, scales, joints):
+        return np.array(HALVES)[:, None]
+
     def columns(self, motion, joints, shape):
-        return motion.total_rate[:, :, None]
+        late = jax.vmap(lambda x: jnp.interp(motion.t + shape[0], motion.t, x), in_axes=1, out_axes=1)
+        return late(motion.total_rate)[:, :, None]
 
     def physical(self, w, shape):
         return w
 
     def amplitudes(self, values):
-        return np.array([values["delay"]]), np.zeros(0)
+        return np.array([values["delay"]]), np.array([0.5 * values["delay"]])
 
     def where(self, names, values, units):
         return f"{names}: positions are logged {1e3 * values['delay']:.3g} ms after the torque they belong to"

@@ -30,7 +30,7 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         at += len(c.columns)
         if c.slug == "inertials":
             continue
-        values = _parameters(robot, ex, index, w[rows], cov[rows, rows])
+        values = _parameters(robot, ex, index, w[rows], cov[rows, rows], float(np.max(widen[rows])))
         names = ", ".join(robot.joint_names[j] for j in c.joints)
         units = {k: v["unit"] for k, v in values.items()}
         out.append({
@@ -45,7 +45,9 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     return sorted(out, key=lambda f: -f["evidence"]["delta_bic"])
 
 
-def _parameters(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray) -> dict[str, Any]:
+def _parameters(
+    robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray, widen: float
+) -> dict[str, Any]:
     """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt."""
     c = ex.data.candidates[index]
     value = _physical(c, w)
@@ -53,7 +55,7 @@ def _parameters(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: n
         (_physical(c, w + step) - _physical(c, w - step)) / (2 * step.sum())
         for step in np.diag(1e-5 * np.maximum(np.abs(w), 1e-6))
     ], axis=1)  # fmt: skip
-    variance = np.einsum("pk,kl,pl->p", slope, cov, slope) + _variance_over_shapes(ex, index, value)
+    variance = np.einsum("pk,kl,pl->p", slope, cov, slope) + _variance_over_shapes(ex, index, value, widen)
     if c.effect.leans_on_inertials:
         variance = variance + (value * _inertial_doubt(ex, c)) ** 2
     slide = robot.is_slide[c.joints[0]]
@@ -75,8 +77,15 @@ def _physical(c: Candidate, w: np.ndarray) -> np.ndarray:
     return np.asarray(c.effect.physical(jnp.asarray(full), jnp.asarray(c.shape)))
 
 
-def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:
-    """Variance of the physical parameters over the refined grid of shapes, amplitudes fitted anew at each."""
+def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray, widen: float) -> np.ndarray:
+    """Variance of the physical parameters over the refined grid of shapes, amplitudes fitted anew at each.
+
+    Args:
+        ex: The explanation.
+        index: The finding.
+        value: Its physical parameters.
+        widen: How much wider than by white noise its amplitudes scatter over the recordings; so does its shape.
+    """
     c = ex.data.candidates[index]
     if not c.effect.refines():
         return np.zeros(len(value))
@@ -86,18 +95,22 @@ def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.
         if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant
     ]
     gain = ex.problem.scores(_others(ex, index), c.joints)[alike]
-    gain = np.where(np.isfinite(gain), gain, -np.inf)
-    p = np.exp(gain - gain.max()) if np.isfinite(gain).any() else np.ones(len(alike))
+    loss = np.where(np.isfinite(gain), gain[alike.index(index)] - gain, np.inf) / widen**2
+    p = np.exp(-np.clip(loss - loss.min(), 0.0, 700.0)) if np.isfinite(loss).any() else np.ones(len(alike))
     p /= p.sum()
     shapes = np.array([ex.data.candidates[i].shape for i in alike])
     off = np.abs(shapes - c.shape) / np.maximum(np.ptp(shapes, axis=0), 1e-300)
     nearest = set(np.argsort(off.sum(axis=1))[1 : 1 + NEIGHBOURS].tolist())
     refitted = {k: _refitted(ex, index, alike[k]) for k in range(len(alike)) if p[k] > 1e-3 or k in nearest}
     between = np.sum([p[k] * (v - value) ** 2 for k, v in refitted.items()], axis=0)
-    # A posterior narrower than the grid is known to the grid's spacing.
     steps = np.array([np.abs(refitted[k] - value) for k in nearest]).reshape(-1, len(value))
+    # A grid narrower than the posterior: the loss to a neighbour, taken for a parabola, says how far it reaches.
+    lost = np.array([max(loss[k], 0.5) for k in nearest]).reshape(-1, 1)
+    beyond = np.max(steps**2 / (2.0 * lost), axis=0, initial=0.0)
+    # A posterior narrower than the grid is known to the grid's spacing.
     spacing = np.min(np.where(steps > 1e-9 * np.abs(value), steps, np.inf), axis=0, initial=np.inf)
-    return np.maximum(between, np.where(np.isfinite(spacing), spacing, 0.0) ** 2 / 12.0)
+    spacing = np.where(np.isfinite(spacing), spacing, 0.0)
+    return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + c.effect.blur() ** 2
 
 
 def _refitted(ex: Explanation, index: int, other: int) -> np.ndarray:
