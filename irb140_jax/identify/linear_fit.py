@@ -45,16 +45,21 @@ class LinearFit(eqx.Module):
 
     def __call__(self, x: Float[Array, " d"], progress: Scalar) -> Scalar:
         """RMSE of the parameters `x`, see `link_parameters`, as an objective of a swarm."""
-        return self.of_phi(phi_of(x, self.mass).ravel())
+        return self._rmse(self.residual(x))
 
     def of_phi(self, phi: Float[Array, " m"]) -> Scalar:
         """RMSE of the inertial parameters of the k links, as in `Robot.phi`."""
-        error = self.R @ phi - self.z
-        return jnp.sqrt((jnp.sum(error**2) + self.rest) / self.rows)
+        return self._rmse(self.R @ phi - self.z)
 
     def residual(self, x: Float[Array, " d"]) -> Float[Array, " m"]:
-        """What least squares minimises: R phi - z."""
-        return self.R @ phi_of(x, self.mass).ravel() - self.z
+        """What least squares minimises: R phi - z, the masses' columns on the right, once for all candidates."""
+        m = self.R.shape[0]
+        R = self.R.reshape(m, -1, 10)
+        unknown = R[:, :, 1:].reshape(m, -1) @ phi_of(x, self.mass)[:, 1:].ravel()
+        return unknown - (self.z - R[:, :, 0] @ self.mass)
+
+    def _rmse(self, error: Float[Array, " m"]) -> Scalar:
+        return jnp.sqrt((jnp.sum(error**2) + self.rest) / self.rows)
 
 
 def linear_fit(robot: Robot, links: Sequence[int], motion: Trajectory, quantity: Quantity = "torque") -> LinearFit:
