@@ -20,7 +20,7 @@ from irb140_jax.errors import InputError
 from irb140_jax.robot import Robot, first_joints, irb140, load_robot
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-RESULTS, FIGURES = ROOT / "results", ROOT / "docs" / "figures"
+RESULTS, DOCS = ROOT / "results", ROOT / "docs"
 JOINTS_OF_THE_STUDY = 3
 # Share of the link's largest value below which an entry is zero: round-off of the file reader's principal axes.
 ROUND_OFF = 1e-9
@@ -126,7 +126,7 @@ class StudyConfig(ArmChoice):
 
     Attributes:
         out: Folder of the results; default results/, and a folder in it for another arm or a smoke run.
-        figures: Folder of the figures; default docs/figures for the study's arm, else within the results.
+        figures: Folder of the figures; default in docs/figures for the IRB 140, else within the results.
         smoke: Everything as small as can be, to see that all works.
         devices: Among which tables 3 and 4 share their seeds; docs/scaling.md says how a CPU has several.
     """
@@ -156,10 +156,19 @@ class StudyConfig(ArmChoice):
 
     def figure_folder(self, arm: StudyArm) -> pathlib.Path:
         """Where figures go; it is made."""
-        beside = self.folder(arm) / "figures"
-        path = self.figures or (FIGURES if arm.is_studys and not self.smoke and self.out is None else beside)
+        in_docs = DOCS / "figures" / ("" if arm.is_studys else f"{len(arm.links)}_joints")
+        path = self.figures or (in_docs if self._is_for_docs(arm) else self.folder(arm) / "figures")
         path.mkdir(parents=True, exist_ok=True)
         return path
+
+    def page_path(self, arm: StudyArm) -> pathlib.Path:
+        """Where the page goes that shows them all."""
+        if self._is_for_docs(arm):
+            return DOCS / ("study.md" if arm.is_studys else f"study-{len(arm.links)}-joints.md")
+        return self.folder(arm) / "study.md"
+
+    def _is_for_docs(self, arm: StudyArm) -> bool:
+        return arm.shipped and not self.smoke and self.out is None
 
     def said(self) -> dict[str, str | int | float | bool | None]:
         """The choices that a result depends on, to be stored beside it."""

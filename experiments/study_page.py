@@ -1,4 +1,7 @@
-"""docs/study.md out of the stored results: what holds, what does not, and why, with every table and figure."""
+"""docs/study.md out of the stored results: what holds, what does not, and why, with every table and figure.
+
+    python experiments/study_page.py [--joints 6] [--robot arm.xml]
+"""
 # ruff: noqa: E501  sentences read better whole
 
 import json
@@ -11,7 +14,8 @@ import numpy as np
 import tables_1_2_arm
 import torque_swarms
 import tracking_report
-from study_arm import ROOT, StudyArm, StudyConfig
+import tyro
+from study_arm import DOCS, StudyArm, StudyConfig
 from study_claims import VERDICTS, arm_claims, beyond_claims, control_claims, network_claims, swarm_claims
 from study_statistics import difference
 from table4_report import CONDITIONS, MODELS, SHOWN
@@ -31,14 +35,13 @@ SAID_OF_TABLE_4 = {
 
 def write(config: StudyConfig, arm: StudyArm) -> pathlib.Path:
     """The page; returns its path."""
-    folder, figures = config.folder(arm), config.figure_folder(arm)
-    path = (figures.parent if figures.parent.name == "docs" else folder) / "study.md"
-    text = page(folder, os.path.relpath(figures, path.parent), arm.is_studys)
+    path = config.page_path(arm)
+    text = page(config.folder(arm), os.path.relpath(config.figure_folder(arm), path.parent), arm)
     path.write_text(text, encoding="utf-8")
     return path
 
 
-def page(folder: pathlib.Path, figures: str, is_studys: bool) -> str:
+def page(folder: pathlib.Path, figures: str, of: StudyArm) -> str:
     """Its text."""
     load = lambda name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))  # noqa: E731
     arm, t3, sets, t4 = (load(n) for n in ("tables_1_2", "table3_swarms", "table3_sets", "table4_control"))
@@ -57,8 +60,8 @@ def page(folder: pathlib.Path, figures: str, is_studys: bool) -> str:
         keep_trailing_newline=True,
     )  # fmt: skip
     return environment.get_template("study.md.j2").render(
-        arm=arm, is_studys=is_studys, t3=t3, t4=t4, sections=sections, figures=figures, network=network,
-        short=in_short(t3, sets, t4, torque, tracking, is_studys), g=lambda x: f"{x:.3g}",
+        arm=arm, title=title(of), is_studys=of.is_studys, t3=t3, t4=t4, sections=sections, figures=figures, network=network,
+        short=in_short(t3, sets, t4, torque, tracking, of.is_studys), g=lambda x: f"{x:.3g}",
         verdicts={v: count[v] for v in VERDICTS if count[v]},
         table1=tables_1_2_arm.table1(arm), table2=tables_1_2_arm.table2(arm),
         seeds=len(sets["sets"]["PSO"]), parameters=parameters(sets), table4=table4(t4),
@@ -66,16 +69,21 @@ def page(folder: pathlib.Path, figures: str, is_studys: bool) -> str:
         torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking),
         tracking_seen=tracking_report.said_of_seen(tracking),
         network_table=network_table(network) if network else "",
-        others=other_arms(folder) if is_studys else [],
+        others=other_arms(folder) if of.is_studys else [],
     )  # fmt: skip
 
 
+def title(arm: StudyArm) -> str:
+    """What the page is of."""
+    return f"{arm.name}, all {arm.whole.n} joints" if len(arm.links) == arm.whole.n else arm.name
+
+
 def other_arms(folder: pathlib.Path) -> list[dict[str, str]]:
-    """Pages of other arms, which lie in folders beside the study's results."""
+    """Pages of more or fewer joints, and of other arms, which lie in folders beside the study's results."""
     found = []
-    for path in sorted(folder.glob("*_joints/study.md")):
-        title = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# The study, reproduced: ")
-        found.append({"title": title, "path": os.path.relpath(path, ROOT / "docs")})
+    for path in sorted([*DOCS.glob("study-*-joints.md"), *folder.glob("*_joints/study.md")]):
+        of = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# The study, reproduced: ")
+        found.append({"title": of, "path": os.path.relpath(path, DOCS)})
     return found
 
 
@@ -208,4 +216,5 @@ def network_table(network: dict) -> str:
 
 
 if __name__ == "__main__":
-    print(write(StudyConfig(), StudyConfig().arm()).relative_to(ROOT))
+    chosen = tyro.cli(StudyConfig)
+    print(write(chosen, chosen.arm()))

@@ -58,7 +58,7 @@ def figure(result: dict, path: pathlib.Path) -> None:
     """Share of every parameter that the loop, and torque, can show; singular values beside it."""
     told = result["seen"]
     names = told["names"]
-    picture, (left, right) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(2.4, 1))
+    picture, (left, right) = plt.subplots(1, 2, figsize=(max(11.0, 0.33 * len(names)), 4), width_ratios=(2.4, 1))
     place = np.arange(len(names))
     for k, (name, colour) in enumerate((("tracking", "tab:green"), ("torque", "0.6"))):
         left.bar(place - 0.2 + 0.4 * k, told[name]["share"], 0.4, color=colour, label=f"through {name}")
