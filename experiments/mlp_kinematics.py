@@ -75,7 +75,7 @@ class Case:
         direction: "forward", joints to position, or "inverse".
         region: One of `REGIONS`.
         hidden: One of `HIDDEN`.
-        epochs: Longest training; chosen by what a core does in a minute or two.
+        epochs: Longest training; chosen by what a core does in one to four minutes.
         batch: Samples per step.
         velocities: Whether velocities are inputs, too.
         loss: "mse" as section 3, or "mae" as equation 33.
@@ -126,7 +126,7 @@ CASES = (
     dataclasses.replace(NEAR_SINGULAR, penalty="log", weight=1e-2),
     dataclasses.replace(NEAR_SINGULAR, penalty="hinge", weight=1e-3),
     dataclasses.replace(NEAR_SINGULAR, penalty="sigmoid", weight=1e-2),
-    Case("inverse", "task", "4 x 122", 250, 500),
+    Case("inverse", "task", "4 x 122", 1000, 1000),
     Case("forward", "task", "1 x 50", 400, 250, velocities=True),
     Case("forward", "whole", "4 x 122", 200, 500),
     # At a rate of 0.01 layers as wide as these are thrown out of the workspace by the first steps.
