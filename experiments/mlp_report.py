@@ -20,8 +20,8 @@ def page(rows: list[dict], regions: dict[str, tuple[list[float], list[float]]]) 
         "",
         f"Mean distance of the tool from where it should be; published {PUBLISHED['training']} mm in training and "
         f"{PUBLISHED['validation']} mm in validation. Three joints, sigmoid, samples made by the kinematics. Trainings "
-        "are cut to what a core does in two to four minutes, so that the widest network has few epochs. The text does not say "
-        "where its robot moved; joint positions here, in degrees:",
+        "are cut to what a core does in two to four minutes, so that the widest network has few epochs. The text does "
+        "not say where its robot moved; joint positions here, in degrees:",
         "",
         *(f"- {name}: {low} to {high}" for name, (low, high) in regions.items()),
         "",
