@@ -42,7 +42,7 @@ def test_the_skeleton_enters_the_catalogue_by_lying_in_its_folder(extended):
 def test_the_columns_of_the_skeleton_are_its_formula(extended):
     qd = np.random.default_rng(0).normal(size=(50, 3))
     q, none = jnp.zeros((50, 3)), jnp.zeros(0)
-    rigid = RigidBody(*(none,) * 9)
+    rigid = RigidBody(*(none,) * 10)
     motion = Motion(jnp.arange(50.0), q, jnp.asarray(qd), q, q, q, q, q, rigid, jnp.full(3, 1e-3), jnp.array(0.0))
     law = extended["quadratic_drag"]
     w, shape = law.amplitudes({"drag": 1.7})

@@ -274,3 +274,18 @@ def test_predictions_for_another_robot_are_refused_with_both_lists_of_joints():
     recording = dataclasses.replace(logged(t, wave(t)[0]), joint_names=("elbow",))
     with pytest.raises(InputError, match="elbow.*joint1"):
         predict(corrected_model(robot), recording)
+
+
+def test_a_joint_that_sticks_while_its_encoder_flickers_between_two_counts_is_at_rest():
+    count, t = 2.0 * np.pi / 4096.0, times()
+    moving = np.where(t < 4.0, np.sin(2.0 * np.pi * 0.5 * t), 0.0)
+    flicker = (np.sin(2.0 * np.pi * 3.0 * t) > 0) & (t >= 4.0)
+    smooth = condition(logged(t, count * (np.round(moving / count) + flicker)), BAND)
+    stuck = (smooth.t > 4.5) & (smooth.t < 7.5)
+    assert not smooth.usable[stuck].any() and smooth.usable[(smooth.t > 0.5) & (smooth.t < 3.5)].mean() > 0.8
+
+
+def test_slow_motion_over_many_counts_is_no_rest():
+    count, t = 2.0 * np.pi / 4096.0, times()
+    q = count * np.round(0.1 * t / count)
+    assert condition(logged(t, q), BAND).usable.all()

@@ -13,6 +13,7 @@ from irb140_jax.mismatch.candidates import Candidate, Stretch
 from irb140_jax.mismatch.evidence import eliminated, gain_of, gains, grams, layouts, posterior
 from irb140_jax.mismatch.noise import ORDER, Noise, noise_from_residuals
 
+LAGS = 3  # coefficients of the whitening filter here, the row's own among them
 JOINTS, NUISANCES, AMPLITUDES = 2, 4, 5
 SETS = ([0], [1, 2], [3], [2, 4], [0, 4], [1])  # amplitudes of some candidates
 WHITE = np.eye(1, ORDER + 1)[0]
@@ -37,7 +38,7 @@ def a_noise(seed: int, recordings: int = 2) -> Noise:
     """A short whitening filter for every joint, another level for every recording."""
     rng = np.random.default_rng(seed)
     ar = np.tile(WHITE, (JOINTS, 1))
-    ar[:, 1:3] = rng.uniform(-0.5, 0.5, (JOINTS, 2))
+    ar[:, 1:LAGS] = rng.uniform(-0.5, 0.5, (JOINTS, 2))
     level = rng.uniform(0.5, 2.0, (recordings, JOINTS))
     return Noise(ar, level, level)
 
@@ -47,11 +48,11 @@ def rows_by_hand(data: list[Stretch], noise: Noise) -> tuple[np.ndarray, np.ndar
     X, y = [], []
     for r, s in enumerate(data):
         for j in range(JOINTS):
-            for i in range(ORDER, len(s.t)):
-                if s.use[i - ORDER : i + 1, j].all():
-                    lags = noise.ar[j] / noise.level[r, j]
-                    X.append(lags @ s.X[i - ORDER : i + 1, j][::-1])
-                    y.append(lags @ s.y[i - ORDER : i + 1, j][::-1])
+            lags = noise.ar[j, :LAGS] / noise.level[r, j]
+            for i in range(LAGS - 1, len(s.t)):
+                if s.use[i - LAGS + 1 : i + 1, j].all():
+                    X.append(lags @ s.X[i - LAGS + 1 : i + 1, j][::-1])
+                    y.append(lags @ s.y[i - LAGS + 1 : i + 1, j][::-1])
     return np.array(X), np.array(y)
 
 
@@ -234,4 +235,26 @@ def test_noise_free_residuals_leave_everything_finite():
 def test_a_row_counts_when_it_and_all_its_lags_do(flags):
     use = np.array(flags)
     expected = [i >= ORDER and bool(use[i - ORDER : i + 1].all()) for i in range(len(use))]
-    assert Noise.usable(use).tolist() == expected
+    assert a_whitening(np.ones(ORDER)).usable(use, 0).tolist() == expected
+
+
+def test_a_row_of_white_noise_counts_whatever_was_before():
+    use = np.array([True, False, True, True, False])
+    assert a_whitening(np.zeros(ORDER)).usable(use, 0).tolist() == use.tolist()
+
+
+def a_whitening(lags):
+    """The noise of one joint in one recording, whitened with these lags."""
+    return Noise(np.append(1.0, lags)[None], np.ones((1, 1)), np.ones((1, 1)))
+
+
+def test_noise_of_few_rows_between_many_gaps_is_of_the_size_of_the_residual():
+    # Per pair, such autocovariances can be those of no signal; the noise was then a thousand times too small or large.
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        x = np.cumsum(rng.normal(size=(480, 1)), axis=0)
+        x -= x.mean()
+        use = np.repeat(rng.random((120, 1)) < 0.4, 4, axis=0)
+        noise = noise_from_residuals([x], [use], np.zeros(1))
+        size = np.sqrt(np.mean(x[use] ** 2))
+        assert 0.5 * size < noise.level[0, 0] < 10.0 * size

@@ -15,6 +15,7 @@ FLANKS = (0.8, 1.25)
 MODE = 35.0  # Hz of the link on a flank, to begin with: above what is compared, so it only times the blows
 LEAST_GIVE = 0.05  # of the gap, by which a flank gives way under the joint's usual torque, at most
 FLANK_DAMPING = 0.15  # of the link on a flank, relative to critical: blows die out within a few swings
+ALIKE = 2.0  # times the torque that its gap accounts for: with more, play only stands in for something else
 STEPS = 4  # of the simulation per sample
 
 
@@ -22,8 +23,9 @@ class Backlash(AbstractEffect):
     """q_link = q - u: the link flies through the gap until a springy flank stops it.
 
     M d2u/dt2 + (d tau/dqd) du/dt + (d tau/dq) u = tau - flank(u), tau what the link would need on the motor's path and
-    flank(u) zero within +-gap/2.  u is simulated along the motion for a gap and a flank on the grid and scaled to a gap
-    of one; the amplitude is the gap, equal to that of the grid where the grid has the right one.
+    flank(u) zero within +-gap/2.  u is simulated along the motion for a gap and a flank on the grid; its amplitude is
+    one where the grid has the right gap.  A spring of the
+    model pulls at the link, and so does what it is wrong by: a second column, k (q - u), nothing where there is none.
     """
 
     slug = "backlash"
@@ -31,7 +33,8 @@ class Backlash(AbstractEffect):
     equation = "-(d tau/dq_j u + d tau/dqd_j du/dt + M_j d2u/dt2), the link free within |u| <= gap/2"
     source = "Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38, 2002"
     parameters = (Parameter("gap", "{q}", low=0.0), Parameter("flank_stiffness", "{tau}/{q}", low=0.0))
-    variants = ((0,),)
+    variants = ((0, 1),)
+    own = (0,)
     confused_with = {
         "presliding_hysteresis": "reversals under different preload",
         "joint_elasticity": "load reversals of several sizes: a gap is crossed whole, a spring bends in proportion",
@@ -46,6 +49,7 @@ class Backlash(AbstractEffect):
     history = "flies from flank to flank, which takes a state of the link beside that of the motor"
     not_in_mjcf = "it is left out: play takes a second joint, and the model another size"
     everywhere = True
+    beside = ("torque_offset",)  # the middle of the gap need not be where the model has no load
     scanned = round(3.0 * np.log(CROSSINGS[1] / CROSSINGS[0]) / np.log(RATIO))
 
     def shapes(self, scales, joints):
@@ -78,21 +82,27 @@ class Backlash(AbstractEffect):
         at = lambda x: jnp.take(x, joints, axis=2)[:, :, 0]  # noqa: E731
         own = lambda x: jnp.take(at(x), joints, axis=1)[:, 0]  # noqa: E731
         load = jnp.take(motion.carried, joints, axis=1)[:, 0]
-        u = _flight(load, own(rigid.mass), own(rigid.by_qd), own(rigid.by_q), 0.5 * shape[0], shape[1], dt) / shape[0]
+        u = _flight(load, own(rigid.mass), own(rigid.by_qd), own(rigid.by_q), 0.5 * shape[0], shape[1], dt)
         # Differences hold the blows on the flanks as well.
         held = jnp.concatenate([u[:1], u, u[-1:]])
         rate, curve = (held[2:] - held[:-2]) / (2.0 * dt), (held[2:] - 2.0 * u + held[:-2]) / dt**2
+        link = jnp.take(motion.q, joints, axis=1)[:, 0] - u
+        spring = jnp.zeros_like(motion.q).at[:, joints[0]].set(jnp.take(rigid.spring, joints)[0] * link)
         u, rate, curve = (x[:, None] for x in (u, rate, curve))
-        return -(at(rigid.by_q) * u + at(rigid.by_qd) * rate + at(rigid.mass) * curve)[:, :, None]
+        play = -(at(rigid.by_q) * u + at(rigid.by_qd) * rate + at(rigid.mass) * curve)
+        return jnp.stack([play, spring], axis=-1)
 
     def physical(self, w, shape):
-        return jnp.stack([w[0], shape[1]])
+        return shape
 
     def amplitudes(self, values):
-        return np.array([values["gap"]]), np.array([values["gap"], values["flank_stiffness"]])
+        return np.array([1.0, 0.0]), np.array([values["gap"], values["flank_stiffness"]])
 
     def lowest(self, robot, joints):
-        return np.zeros(1)
+        return np.array([0.0, -1.0])
+
+    def highest(self, robot, joints):
+        return np.array([ALIKE, np.inf])
 
     def where(self, names, values, units):
         return f"{names}: wherever its load changes sign; a gap of {values['gap']:.3g} {units['gap']}"

@@ -28,6 +28,7 @@ class RigidBody(eqx.Module):
         across: Two unit vectors across gravity in base axes, shape (2, 3).
         last_link: Torque per inertial parameter of the last link, shape (T, n, 10).
         by_q, by_qd: Derivatives of the torque by joint positions and velocities, shape (T, n, n), torque first.
+        spring: Stiffness of the model's own springs, shape (n,).
         mass: Joint-space mass matrix, links only, shape (T, n, n).
         tool: Position of the tool in the world [m], shape (T, 3).
         tool_jacobian: Velocity of the tool per joint speed, world axes [m or 1], shape (T, n, 3).
@@ -39,6 +40,7 @@ class RigidBody(eqx.Module):
     last_link: Float[Array, "T n 10"]
     by_q: Float[Array, "T n n"]
     by_qd: Float[Array, "T n n"]
+    spring: Joints
     mass: Float[Array, "T n n"]
     tool: Float[Array, "T 3"]
     tool_jacobian: Float[Array, "T n 3"]
@@ -122,7 +124,9 @@ class AbstractEffect(abc.ABC):
         once: It happens once, in one recording; nothing of it can be predicted from the others.
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
         scouts: Its grid of shapes is looked for in the residual (see `scout`).
+        beside: Effects that are left free in a scan: without them it would find the shape that stands in for them.
         scanned: From how many shapes a scout picks the best: what chance has as many tries at.
+        adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
         steps: Whether it can be simulated forward in time all the same (see `memory` and `step`).
@@ -149,7 +153,9 @@ class AbstractEffect(abc.ABC):
     once: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
     scouts: ClassVar[bool] = False
+    beside: ClassVar[tuple[str, ...]] = ()
     scanned: ClassVar[int] = 1
+    adds_up: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)
     history: ClassVar[str | None] = None
     steps: ClassVar[bool] = False

@@ -17,7 +17,7 @@ class LoadDependentFriction(AbstractEffect):
     source = "Hamon, Gautier, Garrec, IROS 2010; Duclusaud et al., arXiv 2410.08650"
     parameters = (Parameter("load_coefficient", "1", low=0.0), Parameter("coulomb", "{tau}", low=0.0))
     contains = ("coulomb_friction",)
-    variants = ((0, 1),)
+    variants = ((0, 1), (1,))  # some gears rub next to nothing without load
     confused_with = {
         "coulomb_friction": "the same speed at several gravity loads or payloads",
         "position_dependent_friction": "the same positions with another payload",

@@ -34,6 +34,7 @@ class PositionDependentFriction(AbstractEffect):
     needs = "motion in both directions over the whole range of the joint"
     friction = True
     dissipative = True
+    adds_up = True
     mjcf = "joint frictionloss, for its constant part"
     not_in_mjcf = "the change along the range is left out: frictionloss knows no position"
 

@@ -26,6 +26,7 @@ class TimeDelay(AbstractEffect):
         "actuator_lag": "a delay acts on all joints alike",
         "viscous_friction": "two excitation frequencies: the phase of a delay grows with frequency",
     }
+    transmission = True
     needs = "fast motion of several joints"
     everywhere = True
     history = "is in the clocks of the log, which shows a torque beside an earlier position"

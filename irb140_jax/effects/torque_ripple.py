@@ -6,6 +6,7 @@ import numpy as np
 from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
 
 POINTS = 10  # cycle numbers in the search at once
+FEWEST_PERIODS = 2.0  # in the range of the joint: less than that is any curve, and repeats nothing
 OVERSAMPLING = 4  # points per resolvable line of the spectrum over position
 
 
@@ -21,13 +22,14 @@ class TorqueRipple(AbstractEffect):
     confused_with = {
         "position_dependent_friction": "the same stretch in both directions: friction changes sign, ripple does not"
     }
+    transmission = True
     needs = "slow motion through the whole range of the joint"
     scouts = True
     scanned = 100
     not_in_mjcf = "it is left out: no joint torque of MJCF is periodic in position"
 
     def shapes(self, scales, joints):
-        return np.geomspace(1.0, 30.0, POINTS)[:, None] / self._span(scales, joints)
+        return np.geomspace(FEWEST_PERIODS, 30.0, POINTS)[:, None] / self._span(scales, joints)
 
     def refines(self):
         return True
@@ -44,7 +46,7 @@ class TorqueRipple(AbstractEffect):
         span = self._span(scales, joints)
         step = 1.0 / (OVERSAMPLING * span)
         # As many cycles as the samples can resolve where the joint is fastest.
-        n = np.arange(0.8 / span, min(400 * step, len(q) / (4 * span)), step)
+        n = np.arange(FEWEST_PERIODS / span, min(400 * step, len(q) / (4 * span)), step)
         if len(q) < 50 or len(n) < 5:
             return None
         phase = 2j * np.pi * n[None, :] * q[:, None]

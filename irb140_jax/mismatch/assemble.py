@@ -14,6 +14,7 @@ TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a shar
 LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
 LOOSE_PRIOR = np.log(0.2)  # such a link is rarer than a left-out effect
 FEWEST_ROWS = 40  # of a joint: any explanation fits fewer, and what is left of them is no measure of noise
+ROUNDING = 1e-9  # of a joint's torque: a column that moves less moves nothing
 BLOCKS = 5  # contiguous blocks per recording: for jackknife intervals, and folds where there is one recording
 
 
@@ -77,7 +78,8 @@ def assemble(lib: Library, stretches: list[Stretch], factor: np.ndarray, uncerta
     torque = np.sqrt(np.mean(np.concatenate([s.tau for s in out]) ** 2, axis=0))
     rms = np.sqrt(np.mean(np.concatenate([s.X[..., nuisances : nuisances + lib.size] for s in out]) ** 2, axis=0))
     with np.errstate(divide="ignore"):
-        typical = np.min(np.where(rms > 0, TYPICAL_SHARE * torque[:, None] / np.where(rms > 0, rms, 1), np.inf), axis=0)
+        seen = rms > ROUNDING * torque[:, None]
+        typical = np.min(np.where(seen, TYPICAL_SHARE * torque[:, None] / np.where(seen, rms, 1), np.inf), axis=0)
     typical[~np.isfinite(typical)] = 0.0
     scale = np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
     loose = LooseInertials()
@@ -112,18 +114,23 @@ def problem(data: Data, noise: Noise, blocks: int = BLOCKS) -> tuple[Problem, Gr
     width = max(len(c.columns) for c in data.candidates)
     lowest = np.full((len(data.candidates), width), -np.inf)
     highest = np.full((len(data.candidates), width), np.inf)
+    summed, least = np.zeros((len(data.candidates), width)), np.full(len(data.candidates), -np.inf)
     for i, c in enumerate(data.candidates):
         s = data.scale[data.nuisances + c.columns]
-        lowest[i, : len(c.columns)] = c.lowest / np.where(s > 0, s, 1.0)
+        # What is there only if it is more than nothing, but moves nothing here, can't be found.
+        unseen = (s == 0.0) & (c.lowest == 0.0)
+        lowest[i, : len(c.columns)] = np.where(unseen, np.inf, c.lowest / np.where(s > 0, s, 1.0))
         highest[i, : len(c.columns)] = c.highest / np.where(s > 0, s, 1.0)
+        if c.effect.adds_up:
+            summed[i, : len(c.columns)], least[i] = s, c.lowest[0]
     energy = np.full(g.rows.shape[1], 1e-300)
     for r, s in enumerate(data.stretches):
         for j in range(len(energy)):
             white = noise.whitened(s.tau[:, j], j, r)
-            energy[j] += np.sum(white[Noise.usable(s.use[:, j])] ** 2)
+            energy[j] += np.sum(white[noise.usable(s.use[:, j], j)] ** 2)
     offset = data.nuisances
     entry = rare - log_prior
-    return Problem(H, g.per_joint, energy, data.candidates, offset, log_prior, entry, lowest, highest), g
+    return Problem(H, g.per_joint, energy, data.candidates, offset, log_prior, entry, lowest, highest, summed, least), g
 
 
 def first_noise(data: Data) -> Noise:

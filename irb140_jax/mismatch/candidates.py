@@ -19,7 +19,7 @@ from irb140_jax import dynamics, kinematics
 from irb140_jax.effects import AbstractEffect, Motion, RigidBody, Scales
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.recordings.condition import Band, Conditioned
-from irb140_jax.robot import Robot, with_phi
+from irb140_jax.robot import Robot
 from irb140_jax.types import JointSamples
 
 CHUNK = 2048  # samples per compiled call: recordings of any length reuse one program
@@ -219,7 +219,8 @@ def prepared(robot: Robot, recording: Conditioned) -> Prepared:
     size = np.linalg.norm(np.asarray(robot.gravity))
     tool, tool_jacobian = (np.asarray(x) for x in _tool(robot, q))
     sides = np.asarray(across(robot.gravity))
-    arrays = (by_gravity, size, sides, Y[..., -10:], by_q, by_qd, mass, tool, tool_jacobian)
+    springs = np.asarray(robot.stiffness)
+    arrays = (by_gravity, size, sides, Y[..., -10:], by_q, by_qd, springs, mass, tool, tool_jacobian)
     rigid = RigidBody(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
     motor_side = np.asarray(robot.armature) * recording.qdd + _friction(robot, recording)
     spring = np.asarray(robot.stiffness) * (recording.q - np.asarray(robot.springref))
@@ -227,9 +228,9 @@ def prepared(robot: Robot, recording: Conditioned) -> Prepared:
     return Prepared(recording, Y, nominal, motor_side, rigid)
 
 
-def with_inertials(along: Prepared, robot: Robot, phi: np.ndarray) -> Prepared:
-    """The same with sensitivities at other inertial parameters, shape (n, 10): those of a robot known better."""
-    return along._replace(rigid=prepared(with_phi(robot, jnp.asarray(phi)), along.recording).rigid)
+def seen_by(robot: Robot, along: Prepared) -> Prepared:
+    """The same with the sensitivities of a robot that is known better."""
+    return along._replace(rigid=prepared(robot, along.recording).rigid)
 
 
 def _weightless(robot: Robot) -> Robot:

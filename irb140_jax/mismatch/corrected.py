@@ -11,7 +11,7 @@ from irb140_jax.dynamics.chain import Plan, chain, plan
 from irb140_jax.dynamics.newton_euler import rigid_torque
 from irb140_jax.effects import AbstractEffect, Motion, RigidBody
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.model import CorrectedModel
+from irb140_jax.mismatch.model import CorrectedModel, better_known
 from irb140_jax.mismatch.sensitivities import Sensitivities
 from irb140_jax.robot import Robot, with_phi
 from irb140_jax.simulate import AbstractPlant
@@ -45,7 +45,7 @@ class CorrectedRobot(AbstractPlant):
     Everything is pure and may be jitted, mapped and differentiated, by the parameters of the effects too.
 
     Attributes:
-        robot: The model with refitted inertials.
+        robot: The model with refitted inertials and the springs found, whose slopes the effects see.
         nominal: The model as given; the load that effects start from is its own, as in the fit.
         rest_speed: Speed over which the sign of qd is rounded off [rad/s or m/s], shape (n,).
         effects: What acts beside the rigid bodies.
@@ -236,5 +236,5 @@ def corrected_robot(model: CorrectedModel) -> CorrectedRobot:
         Acting(named.effect, named.joints, jnp.asarray(named.all_amplitudes()), jnp.asarray(named.shape, dtype=float))
         for named in model.named
     )
-    robot = with_phi(model.robot, jnp.asarray(model.phi_corrected))
+    robot = better_known(model.robot, model.phi_corrected, model.named)
     return CorrectedRobot(robot, model.robot, jnp.asarray(model.rest_speed), acting, plan(model.robot))

@@ -17,11 +17,11 @@ from irb140_jax.mismatch.candidates import (
     prepared,
     reshaped,
     scales_of,
+    seen_by,
     stretch,
-    with_inertials,
 )
 from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
-from irb140_jax.mismatch.model import composed
+from irb140_jax.mismatch.model import Named, better_known, composed
 from irb140_jax.mismatch.name import Problem, search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
@@ -99,8 +99,8 @@ def explain(
         ex = _settled(lib, data, factor, chosen, ex.noise if ex else None)
         if turn < PASSES - 1:
             post = full_posterior(data, ex.problem, ex.grams, ex.chosen)
-            phi = np.asarray(robot.phi) + fitted(data, post, ex.chosen, factor)[0].reshape(-1, 10)
-            along = [with_inertials(r, robot, phi) for r in along]
+            better = _better_known(robot, fitted(data, post, ex.chosen, factor))
+            along = [seen_by(better, r) for r in along]
             loads = [_loads(lib, data, post, ex.chosen, factor, r, i) for i, r in enumerate(along)]
             lib, chosen = _refined(lib, ex, scales)
     assert ex is not None, "PASSES is at least one"
@@ -134,6 +134,13 @@ def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -
     # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
     used = len(post.columns) - float(np.trace(post.cov))
     return noise_from_residuals(residuals, [s.use for s in data.stretches], np.full(n, used / n))
+
+
+def _better_known(robot: Robot, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> Robot:
+    """What an explanation (see `fitted`) says of the robot."""
+    dphi, members, amplitudes = found
+    named = [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
+    return better_known(robot, np.asarray(robot.phi) + dphi.reshape(-1, 10), named)
 
 
 def _loads(

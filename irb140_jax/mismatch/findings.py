@@ -51,23 +51,38 @@ def _parameters(
     """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt."""
     c = ex.data.candidates[index]
     value = _physical(c, w)
+    w, cov = _of_all_columns(ex, index, w, cov)
+    physical = lambda w: np.asarray(c.effect.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
     slope = np.stack([
-        (_physical(c, w + step) - _physical(c, w - step)) / (2 * step.sum())
+        (physical(w + step) - physical(w - step)) / (2 * step.sum())
         for step in np.diag(1e-5 * np.maximum(np.abs(w), 1e-6))
     ], axis=1)  # fmt: skip
     variance = np.einsum("pk,kl,pl->p", slope, cov, slope) + _variance_over_shapes(ex, index, value, widen)
     if c.effect.leans_on_inertials:
         variance = variance + (value * _inertial_doubt(ex, c)) ** 2
     slide = robot.is_slide[c.joints[0]]
-    whole = len(c.variant) == max(max(v) for v in c.effect.variants) + 1
-    present = range(len(value)) if whole else [i for i in c.variant if i < len(value)]
     return {
-        c.effect.parameters[i].name: {
+        parameter.name: {
             "value": float(value[i]), "std": float(np.sqrt(max(variance[i], 0.0))),
-            "unit": c.effect.unit(c.effect.parameters[i], slide),
+            "unit": c.effect.unit(parameter, slide),
         }
-        for i in present
+        for i, parameter in enumerate(c.effect.parameters)
     }  # fmt: skip
+
+
+def _of_all_columns(ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitudes and covariance of all columns of an effect: those unused are zero but for what the data leave open."""
+    c = ex.data.candidates[index]
+    width = max(max(v) for v in c.effect.variants) + 1
+    columns = c.columns[0] - c.variant[0] + np.arange(width)
+    H = ex.problem.eliminated_near(ex.chosen, columns + ex.problem.offset)
+    scale = ex.data.scale[ex.data.nuisances + columns]
+    full, spread = np.zeros(width), np.diag(scale**2 / (1.0 + np.diag(H)[:-1]))
+    used = list(c.variant)
+    full[used] = w
+    spread[used] = spread[:, used] = 0.0
+    spread[np.ix_(used, used)] = cov
+    return full, spread
 
 
 def _physical(c: Candidate, w: np.ndarray) -> np.ndarray:

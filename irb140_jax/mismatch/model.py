@@ -1,6 +1,7 @@
 """The corrected model: nominal robot, refitted inertials, and the named effects with their parameters."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -17,11 +18,11 @@ from irb140_jax.mismatch.candidates import (
     Loads,
     columns_along,
     prepared,
-    with_inertials,
+    seen_by,
 )
 from irb140_jax.recordings.condition import Band, Conditioned, condition
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.robot import Robot
+from irb140_jax.robot import Robot, with_phi
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,6 +48,24 @@ class Named:
         full = np.zeros(max(max(v) for v in self.effect.variants) + 1)
         full[list(self.variant)] = self.amplitudes
         return full
+
+
+def better_known(robot: Robot, phi: np.ndarray, named: Sequence[Named]) -> Robot:
+    """The robot whose slopes over position and speed shape the effects: refitted inertials, and the springs named.
+
+    The load that effects see holds those springs; without them in the slopes, play would be taken out of a link that
+    is softer or stiffer than its load says.
+
+    Args:
+        robot: The nominal model.
+        phi: Inertial parameters, shape (n, 10).
+        named: The effects.
+    """
+    sprung = robot
+    for n in named:
+        sprung = n.effect.in_model(sprung, n.joints, n.all_amplitudes(), n.shape)
+    springs = lambda r: (r.stiffness, r.springref)  # noqa: E731
+    return eqx.tree_at(springs, with_phi(robot, jnp.asarray(phi)), springs(sprung))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,7 +158,7 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     nominal_phi = np.asarray(model.robot.phi)
     shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
     amplitudes = [named.amplitudes for named in model.named]
-    along = with_inertials(prepared(model.robot, recording), model.robot, model.phi_corrected)
+    along = seen_by(better_known(model.robot, model.phi_corrected, model.named), prepared(model.robot, recording))
     torques = composed(lib, columns_along(lib, along), candidates, amplitudes, *shifts)
     if not model.named:
         return torques

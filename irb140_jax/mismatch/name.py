@@ -40,6 +40,7 @@ class Problem:
         entry: Log odds that a candidate lacks to enter where nothing was: ordinary effects are likely rivals of others,
             but no likelier to be found by chance.
         lowest, highest: Admissible amplitudes in prior units, per candidate, padded with -inf and inf.
+        summed, least: Weights of the amplitudes in a sum that is bounded from below, and its bound, per candidate.
     """
 
     H: np.ndarray
@@ -51,6 +52,8 @@ class Problem:
     entry: np.ndarray
     lowest: np.ndarray
     highest: np.ndarray
+    summed: np.ndarray
+    least: np.ndarray
 
     def columns(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Columns of H that a set uses."""
@@ -82,6 +85,7 @@ class Problem:
         gain, mean = gains(H, near.groups, len(self.candidates), self.lowest.shape[1])
         with np.errstate(invalid="ignore"):
             bad = np.any((mean < self.lowest - 1e-9) | (mean > self.highest + 1e-9), axis=1)
+        bad |= np.nansum(mean * self.summed, axis=1) < self.least
         return np.where(bad | (self._share(mean) < LEAST_SHARE), -np.inf, gain + self.log_prior)
 
     def eliminated_near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:

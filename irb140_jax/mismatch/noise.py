@@ -15,6 +15,8 @@ from scipy import linalg, signal
 ORDER = 10  # lags; at about twice the band this spans a quarter of a second
 SPECTRUM = 256  # points of the spectrum
 RIDGE = 1e-3
+ENOUGH = 0.5  # of the rows, which must have all their lags for correlations to be known pair by pair
+NEGLIGIBLE = 0.1  # weight of every lag, of the row's own, below which noise is white: no row needs those before it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,14 +34,14 @@ class Noise:
     total: np.ndarray
 
     def whitened(self, x: np.ndarray, joint: int, recording: int) -> np.ndarray:
-        """Rows of one joint (axis 0) with white noise of unit variance; the first ORDER rows are not to be used."""
+        """Rows of one joint (axis 0) with white noise of unit variance; only `usable` ones are to be used."""
         return signal.lfilter(self.ar[joint], [1.0], x, axis=0) / self.level[recording, joint]
 
-    @staticmethod
-    def usable(use: np.ndarray) -> np.ndarray:
-        """Rows all of whose lags are usable, shape (R,)."""
-        runs = np.convolve(use.astype(int), np.ones(ORDER + 1, dtype=int))[: len(use)]
-        return runs == ORDER + 1
+    def usable(self, use: np.ndarray, joint: int) -> np.ndarray:
+        """Rows that count together with all the lags that the joint's whitening looks back on, shape (R,)."""
+        lags = int(np.flatnonzero(self.ar[joint])[-1])
+        runs = np.convolve(use.astype(int), np.ones(lags + 1, dtype=int))[: len(use)]
+        return runs == lags + 1
 
 
 def noise_from_residuals(residuals: list[np.ndarray], use: list[np.ndarray], dof: np.ndarray) -> Noise:
@@ -60,10 +62,10 @@ def noise_from_residuals(residuals: list[np.ndarray], use: list[np.ndarray], dof
         scale = [np.sqrt(np.mean(r[u[:, j], j] ** 2)) if u[:, j].any() else 0.0
                  for r, u in zip(residuals, use, strict=True)]  # fmt: skip
         # Each recording counts by its shape, not by its size: the loudest must not decide the colour.
-        acov = sum(
-            _autocovariance(r[:, j] / s, u[:, j]) for r, u, s in zip(residuals, use, scale, strict=True) if s > 0
-        )
-        ar[j], innovation = _whitener(np.atleast_1d(acov))
+        acov = np.zeros((2, ORDER + 1))
+        for r, u, s in zip(residuals, use, scale, strict=True):
+            acov += _autocovariance(r[:, j] / s, u[:, j]) if s > 0 else 0.0
+        ar[j], innovation = _whitener(_per_pair(*acov))
         rows = sum(int(u[:, j].sum()) for u in use)
         inflate = np.sqrt(rows / max(rows - dof[j], 0.2 * rows, 1.0))
         for r in range(len(residuals)):
@@ -77,18 +79,22 @@ def noise_from_residuals(residuals: list[np.ndarray], use: list[np.ndarray], dof
 
 
 def _autocovariance(x: np.ndarray, use: np.ndarray) -> np.ndarray:
-    """Sums of lagged products over pairs of usable rows, per pair, lags 0..ORDER, weighted by their number."""
+    """Sums over the usable rows: lagged products and numbers of pairs, lags 0..ORDER, shape (2, ORDER + 1)."""
     masked = np.where(use, x, 0.0)
-    out = np.zeros(ORDER + 1)
-    for lag in range(ORDER + 1):
-        pairs = np.sum(use[lag:] & use[: len(use) - lag])
-        out[lag] = masked[lag:] @ masked[: len(x) - lag] / max(pairs, 1) * use.sum()
-    return out
+    products = [masked[lag:] @ masked[: len(x) - lag] for lag in range(ORDER + 1)]
+    return np.array([products, [np.sum(use[lag:] & use[: len(use) - lag]) for lag in range(ORDER + 1)]])
+
+
+def _per_pair(products: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Autocovariances per pair; as they are where gaps leave few pairs or the estimate has a spectrum below zero."""
+    covariances = products * pairs[0] / np.maximum(pairs, 1)
+    possible = np.linalg.eigvalsh(linalg.toeplitz(covariances))[0] > 0.0
+    return covariances if possible and pairs[-1] > ENOUGH * pairs[0] else products
 
 
 def _whitener(acov: np.ndarray) -> tuple[np.ndarray, float]:
     """Whitening filter for a spectrum that never falls with frequency, and its innovation for unit variance."""
-    if acov.shape[0] != ORDER + 1 or acov[0] <= 0:
+    if acov[0] <= 0:
         return np.eye(1, ORDER + 1)[0], 1.0
     acov = acov / acov[0]
     a, variance = _yule_walker(acov)
@@ -97,6 +103,8 @@ def _whitener(acov: np.ndarray) -> tuple[np.ndarray, float]:
     acov = np.fft.irfft(rising, SPECTRUM)[: ORDER + 1]
     acov = acov * max(1.0, 1.0 / acov[0])  # over gaps, autocovariances may belong to no spectrum; never less than seen
     a, variance = _yule_walker(acov)
+    if np.abs(a[1:]).max() < NEGLIGIBLE:
+        return np.eye(1, ORDER + 1)[0], float(np.sqrt(acov[0]))
     return a, float(np.sqrt(variance))
 
 

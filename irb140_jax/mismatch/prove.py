@@ -148,7 +148,8 @@ def transferring(ex: Explanation) -> Explanation:
             if ex.data.candidates[c].slug == "inertials":
                 continue
             rest = tuple(x for x in ex.chosen if x != c)
-            options = possible_beside(ex.problem, rest, simpler(ex.problem, c))
+            fits = np.isfinite(ex.problem.scores(rest, ex.data.candidates[c].joints))
+            options = [o for o in possible_beside(ex.problem, rest, simpler(ex.problem, c)) if fits[list(o)].all()]
             for option, least in ((), 0.0), *((o, PREFER) for o in options):
                 loss = 0.5 * (unseen_error(ex, (*rest, *option)) - error) - least
                 if loss < worst:

@@ -23,9 +23,11 @@ def scouted(
     Without it, the first search would explain a push or a wall by whatever else is in the library.
     """
     effects = [block[0] for block in lib.blocks]
-    plain = library(lib.robot, [e for e in effects if e.ordinary], scales)
+    ordinary = [e for e in effects if e.ordinary]
+    beside = [e for e in effects if any(e.slug in o.beside for o in effects)]
+    plain = library(lib.robot, ordinary + beside, scales)
     data = assemble(plain, [stretch(plain, r, i, band) for i, r in enumerate(along)], factor, uncertainty)
-    columns = np.arange(data.nuisances + plain.size)
+    columns = np.arange(data.nuisances + library(lib.robot, ordinary, scales).size)
     noise = np.array([[_rms(s.y[s.use[:, j], j]) for j in range(lib.robot.n)] for s in data.stretches])
     for _ in range(2):  # the first noise holds what friction explains
         left = left_over(data, columns, noise)
@@ -33,7 +35,8 @@ def scouted(
                  for j in range(lib.robot.n)] for r in range(len(along))]  # fmt: skip
         noise = noise * np.array(size)
     left = left_over(data, columns, noise)
-    best = _scanned(lib, along, band, scales, left)
+    free = np.arange(data.nuisances + plain.size)
+    best = _scanned(lib, along, band, scales, left_over(data, free, noise))
     shapes = [
         np.stack([
             e.around(best[e.slug, tuple(joints)]) if (e.slug, tuple(joints)) in best

@@ -11,7 +11,7 @@ from irb140_jax.dynamics.newton_euler import rigid_torque
 from irb140_jax.dynamics.regressor import regressor_blocks
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.robot import Robot
-from irb140_jax.types import JointSamples, Scalar
+from irb140_jax.types import Joints, JointSamples, Scalar
 
 
 class Sensitivities(eqx.Module):
@@ -62,6 +62,11 @@ class Sensitivities(eqx.Module):
     def by_q(self) -> Float[Array, "T n n"]:
         """Derivative of the torque by joint positions, torque first."""
         return self._by(0) + jnp.diag(self.robot.stiffness)  # springs of the model pull at the link
+
+    @property
+    def spring(self) -> Joints:
+        """Stiffness of the model's own springs."""
+        return self.robot.stiffness
 
     @property
     def by_qd(self) -> Float[Array, "T n n"]:

@@ -12,7 +12,6 @@ from scipy import signal
 
 from irb140_jax.mismatch.candidates import Stretch
 from irb140_jax.mismatch.explain import Explanation, full_posterior
-from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prove import HeldOut
 
 FEATURES = 60  # random Fourier features a competitor
@@ -155,7 +154,7 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
 
 def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
     """Only the level is divided out, not the colour: a slow structure is exactly what is looked for."""
-    pick = [Noise.usable(s.use[:, j]) for s in ex.data.stretches]
+    pick = [ex.noise.usable(s.use[:, j], j) for s in ex.data.stretches]
     level = np.concatenate([np.full(p.sum(), ex.noise.total[r, j]) for r, p in enumerate(pick)])
     recording = np.repeat(np.arange(len(pick)), [p.sum() for p in pick])
     y = np.concatenate([c[p, j] for c, p in zip(proof.corrected, pick, strict=True)]) / level

@@ -21,6 +21,7 @@ MIN_TORQUE_BAND = 4.0  # Hz; friction reversals are steps, a narrower band would
 WORKING_RATE = 200.0  # Hz; columns are evaluated at least this often
 SLOW = 3.0  # Hz; below, model and log may differ by the very friction that is looked for
 INCOHERENT = 0.05  # share of the model's torque that may be noise: what biases parameters by as much
+REST = 0.1  # s that a joint must stay where it is to rest: a reversal takes less
 CERTAIN = 1.5  # times the noise that a spectrum must exceed before any of it counts as signal: its own scatter
 AT_ONCE = 32  # low-passed rows in one product: about as long as the filter
 KAISER_BETA = 6.0  # about 63 dB in the stop band: below the noise of any torque log
@@ -185,15 +186,17 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     h, h1, h2 = _kernels(band.position, raw_rate)
     half = (len(h) - 1) // 2
     anti_alias = _kernels(min(0.4 * band.rate, 0.45 * raw_rate), raw_rate)[0]
-    q, speed_noise = _without_noise(q, _density(recording, t, raw_rate), raw_rate, h1)
+    white = _white_density(recording, raw_rate)
+    q, speed_noise = _without_noise(q, white, raw_rate, h1, resampled=t is not recording.t)
     smoothed = [_filtered(q, k, odd=True) for k in (h, h1, h2)]
     tau = _filtered(tau, anti_alias, odd=False)
     keep = slice(None) if pad else slice(half, len(t) - half)
     grid = np.arange(t[keep][0], t[keep][-1] + 1e-9, 1.0 / band.rate)
     q, qd, qdd, tau = (_at(grid, t, x) for x in (*smoothed, tau))
     rest_speed = np.maximum(np.maximum(3.0 * speed_noise, 0.003 * np.abs(qd).max(axis=0, initial=0.0)), 1e-6)
-    resting = ndimage.minimum_filter1d((np.abs(qd) < rest_speed).astype(int), int(0.1 * band.rate) | 1, axis=0)
-    resting = ndimage.maximum_filter1d(resting, int(0.2 * band.rate) | 1, axis=0).astype(bool)
+    slow = ndimage.minimum_filter1d((np.abs(qd) < rest_speed).astype(float), int(REST * band.rate) | 1, axis=0)
+    stuck = _at(grid, recording.t, _within_a_step(recording).astype(float))
+    resting = ndimage.maximum_filter1d(np.maximum(slow, stuck), int(2 * REST * band.rate) | 1, axis=0) > 0.5
     # A gap spoils what the smoother and, later, the low-pass reach from it; half their length holds most of that.
     reach = (int(np.ceil(half / raw_rate * band.rate)) + (len(band.low_pass()) - 1) // 2) // 2
     lost = ndimage.maximum_filter1d((np.interp(grid, t, missing.astype(float)) > 0).astype(int), 2 * reach + 1) > 0
@@ -204,7 +207,20 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     return Conditioned(recording.source, grid, q, qd, qdd, tau, usable, rest_speed, tuple(notes), began)
 
 
-def _without_noise(q: np.ndarray, density: np.ndarray, rate: float, h1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _within_a_step(recording: Recording) -> np.ndarray:
+    """Rows around which a joint's position stays within one step of its encoder for `REST`, shape (T, n).
+
+    A joint that sticks while its encoder flickers between two counts would otherwise seem to move back and forth.
+    """
+    step = np.array([np.min(d[d > 0], initial=np.inf) for d in np.abs(np.diff(recording.q, axis=0)).T])
+    window = int(REST / np.median(np.diff(recording.t))) | 1
+    span = ndimage.maximum_filter1d(recording.q, window, axis=0) - ndimage.minimum_filter1d(recording.q, window, axis=0)
+    return span < 1.5 * step
+
+
+def _without_noise(
+    q: np.ndarray, white: np.ndarray, rate: float, h1: np.ndarray, *, resampled: bool
+) -> tuple[np.ndarray, np.ndarray]:
     """Wiener's smoother: every frequency of every joint's position weighted by the share of it that is signal.
 
     What is optimal for q is so for its derivatives too.  Without it, encoder noise between the motion's highest
@@ -212,9 +228,10 @@ def _without_noise(q: np.ndarray, density: np.ndarray, rate: float, h1: np.ndarr
 
     Args:
         q: Positions on an even grid, shape (T, n).
-        density: Power density of their white noise [rad^2/Hz or m^2/Hz], shape (n,).
+        white: Power density of their white noise [rad^2/Hz or m^2/Hz], shape (n,).
         rate: Samples per second.
         h1: Taps of the differentiator that follows.
+        resampled: Whether the spectrum's top no longer shows the noise.
 
     Returns:
         Positions, shape (T, n), and the standard deviation of the noise in their speeds, shape (n,).
@@ -228,10 +245,12 @@ def _without_noise(q: np.ndarray, density: np.ndarray, rate: float, h1: np.ndarr
     f = np.fft.rfftfreq(len(longer), 1.0 / rate)
     out, noise = np.empty_like(q), np.zeros(q.shape[1])
     for j in range(q.shape[1]):
-        share, floor, at = _signal_share(q[:, j], density[j], rate)
+        share, floor, at = _signal_share(q[:, j], white[j] if resampled else 0.0, rate)
         weight = np.interp(f, at, share)
         out[:, j] = (np.fft.irfft(spectrum[:, j] * weight, len(longer)) + trend[:, j])[reach : reach + len(q)]
         response = np.abs(np.fft.rfft(h1, 8192)) * np.interp(np.fft.rfftfreq(8192, 1.0 / rate), at, share)
+        # Jerks fill the top of the spectrum, but few samples.
+        floor = min(floor, white[j])
         noise[j] = np.sqrt(floor * np.sum(response**2) * rate / 8192)
     return out, noise
 
@@ -259,6 +278,11 @@ def _density(recording: Recording, even: np.ndarray, rate: float) -> np.ndarray:
     """
     if even is recording.t:
         return np.zeros(recording.q.shape[1])
+    return _white_density(recording, rate)
+
+
+def _white_density(recording: Recording, rate: float) -> np.ndarray:
+    """Power density of the white noise in positions at this rate [rad^2/Hz or m^2/Hz], shape (n,)."""
     return np.array([2.0 * white_noise(recording.t, x) ** 2 / rate for x in recording.q.T])
 
 

@@ -22,7 +22,7 @@ MACHINE = "cycloidal_play"
 JOINT = "output"
 STIFFNESS = 275.0  # N m/rad, the middle of the published 200 to 350
 INERTIA = 1e-4  # kg m^2, of what the bolted output still turns: nothing beside the spring, but no zero for MuJoCo
-AVERAGED = 0.02  # s; a ramp takes 4 s
+AVERAGED = 0.01  # s; a ramp takes 4 s, but the play is crossed in a tenth of one
 FIRST_BIG_RAMP = 100  # `test_nr` of the ramps that saturate; below are those of the play test
 
 
@@ -56,8 +56,9 @@ def cycloidal_recording(run: str, folder: pathlib.Path | None = None) -> Recordi
     table = with_coarse_times_spread(table, notes)
     bins = np.floor((table["t"] - table["t"][0]) / AVERAGED).astype(int)
     count = np.bincount(bins)[:-1]  # the last bin is not full
-    q, tau = (np.bincount(bins, weights=table[name])[:-1] / count for name in ("q", "tau"))
-    t = AVERAGED * (np.arange(len(count)) + 0.5)
+    some = np.flatnonzero(count)  # the operating system was away for longer now and then
+    q, tau = (np.bincount(bins, weights=table[name])[some] / count[some] for name in ("q", "tau"))
+    t = AVERAGED * (some + 0.5)
     q -= 0.5 * (q.min() + q.max())
     notes.append(f"Rows were averaged over {1000 * AVERAGED:g} ms")
     return Recording(t=t, q=q[:, None], tau=tau[:, None], joint_names=(JOINT,), source=run, notes=tuple(notes))

@@ -1,0 +1,205 @@
+"""Diagnose a real servo that swings a pendulum, and simulate its position loop with what was named.
+
+    python experiments/real_bam_xl330.py [--out results]
+
+Fitted on the runs with gains 100, 200 and 800, judged on those with gain 400, as published.  Torque alone decides what
+is named.  The numbers are then refitted to the positions, in the closed loop in which they are judged: least squares on
+torque is drawn towards whatever a friction law does not follow, such as sticking.
+"""
+
+import dataclasses
+import json
+import pathlib
+import tempfile
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import tyro
+from jaxtyping import Array, Float
+from scipy import optimize
+
+from irb140_jax.compilation_cache import set_up_compilation_cache
+from irb140_jax.mismatch import diagnose
+from irb140_jax.recordings import Recording, read_recording
+from irb140_jax.recordings.machines.bam_xl330 import KT, LENGTH, MASS, R, servo_recording, servo_runs, write_servo
+from irb140_jax.robot import load_robot
+
+JUDGED = 400  # gain of the runs that no fit sees
+GOAL = 0.0325  # rad, mean absolute error of position on those, published with load-dependent friction
+GRAVITY = 9.81  # m/s^2
+SUPPLY = 7.4  # V
+ERROR_GAIN = 4096.0 / (2.0 * np.pi) / (256.0 * 885.0)  # duty per rad and unit of gain: counts of encoder and bridge
+STEP = 1e-3  # s of the simulation: five of it are a step of the published one
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """Where to write, and how long to search from how many starts."""
+
+    out: pathlib.Path = pathlib.Path("results")
+    evaluations: int = 450
+    starts: int = 5
+    seed: int = 0
+
+
+class Servo(eqx.Module):
+    """Numbers of the simulated servo.
+
+    Attributes:
+        gain: Torque that the data sheet promises, over that which moves the pendulum.
+        rotor: Inertia of the rotor on the output, in torque of the data sheet [kg m^2].
+        viscous: Friction [N m s/rad].
+        brake: Back electromotive force, over that of the data sheet.
+        coulomb: Friction without load [N m].
+        load: Friction as a share of the load.
+    """
+
+    gain: Float[Array, ""]
+    rotor: Float[Array, ""]
+    viscous: Float[Array, ""]
+    brake: Float[Array, ""]
+    coulomb: Float[Array, ""]
+    load: Float[Array, ""]
+
+
+class Run(eqx.Module):
+    """What a simulation of one run is given, on its own grid of time, and where the servo really was.
+
+    Attributes:
+        kp: Gain of the position loop.
+        goal: Position asked for [rad], shape (S,).
+        on: Whether the motor is switched on, shape (S,).
+        q: Position [rad], shape (S,).
+    """
+
+    kp: Float[Array, ""]
+    goal: Float[Array, " S"]
+    on: Float[Array, " S"]
+    q: Float[Array, " S"]
+
+
+# Where searches begin: the data sheet is right, a rotor and some friction there, half of it for each law.
+START = {"gain": 1.2, "rotor": 2e-3, "viscous": 1e-2, "brake": 1.0, "coulomb": 2e-2, "load": 0.2}
+SCATTER = 0.5  # standard deviation of further starts, in the logarithm
+COULOMB_AND_VISCOUS = ("gain", "rotor", "viscous", "brake", "coulomb")
+
+
+def simulated(servo: Servo, run: Run) -> Float[Array, " S"]:
+    """Position of the servo in its loop, by semi-implicit Euler; dry friction stops it within a step if it can.
+
+    duty = clip(kp gain (goal - q), +-1), V = duty supply, tau = kt/R V - brake kt^2/R qd while switched on, else none.
+    The gear carries the motor's torque on one side and the weight on the other: its load is their mean, as published.
+    """
+    inertia = servo.gain * MASS * LENGTH**2 + servo.rotor
+
+    def step(state, now):
+        (q, qd), (goal, on) = state, now
+        volts = SUPPLY * jnp.clip(run.kp * ERROR_GAIN * (goal - q), -1.0, 1.0)
+        weight = servo.gain * MASS * LENGTH * GRAVITY * jnp.sin(q)
+        motor = on * (KT / R * volts - servo.brake * KT**2 / R * qd)
+        drive = motor - weight - servo.viscous * qd
+        level = servo.coulomb + servo.load * 0.5 * jnp.abs(motor + weight)
+        stopping = -(inertia * qd / STEP + drive)
+        qd = qd + STEP / inertia * (drive + jnp.clip(stopping, -level, level))
+        return (q + STEP * qd, qd), q
+
+    return jax.lax.scan(step, (run.q[0], 0.0), (run.goal, run.on))[1]
+
+
+@eqx.filter_jit
+def error(servo: Servo, runs: Run) -> Float[Array, " runs"]:
+    """Mean absolute error of position of every run [rad]."""
+    return jax.vmap(lambda run: jnp.mean(jnp.abs(simulated(servo, run) - run.q)))(runs)
+
+
+def stacked(recordings: Sequence[tuple[int, Recording]]) -> Run:
+    """Runs on grids of equally many samples; goals hold until the next comes."""
+    count = min(int((r.t[-1] - r.t[0]) / STEP) for _, r in recordings)
+    rows = []
+    for kp, r in recordings:
+        grid = r.t[0] + STEP * np.arange(count)
+        held = np.searchsorted(r.t, grid, side="right") - 1
+        goal, on, q = r.extras["goal"][held], r.extras["enabled"][held], np.interp(grid, r.t, r.q[:, 0])
+        rows.append(Run(jnp.asarray(float(kp)), *(jnp.asarray(x) for x in (goal, on, q))))
+    return jax.tree.map(lambda *x: jnp.stack(x), *rows)
+
+
+def refitted(free: Sequence[str], seen: Run, config: Config) -> list[Servo]:
+    """Servos whose simulation errs least on the runs seen, one for every start of the search, the best first."""
+    middle, rng = np.log([START[name] for name in free]), np.random.default_rng(config.seed)
+    starts = [middle, *(middle + SCATTER * rng.normal(size=(config.starts - 1, len(free))))]
+    found = [nearest_optimum(free, start, seen, config.evaluations) for start in starts]
+    return sorted(found, key=lambda servo: float(jnp.mean(error(servo, seen))))
+
+
+def nearest_optimum(free: Sequence[str], start: np.ndarray, seen: Run, evaluations: int) -> Servo:
+    """Where a simplex over the logarithms of the free numbers ends; the other numbers are zero."""
+
+    def servo(x: np.ndarray) -> Servo:
+        return Servo(**{name: jnp.asarray(0.0) for name in START} | dict(zip(free, jnp.exp(x), strict=True)))
+
+    simplex = np.vstack([start, start + 0.4 * np.eye(len(free))])  # begins 40 % apart
+    options = {"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-6}
+    best = optimize.minimize(
+        lambda x: float(jnp.mean(error(servo(x), seen))), start, method="Nelder-Mead", options=options
+    )
+    return servo(best.x)
+
+
+def diagnosed() -> dict:
+    """The diagnosis of the runs seen."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = [write_servo(pathlib.Path(folder), name) for name, (kp, _) in servo_runs().items() if kp != JUDGED]
+        robot = load_robot(files[0][0])
+        return diagnose(robot, [read_recording(path, robot) for _, path in files]).diagnosis
+
+
+def run(config: Config) -> dict:
+    """Diagnose on the runs seen, then refit and judge Coulomb and viscous friction alone and with what was named."""
+    runs = {name: (kp, servo_recording(name)) for name, (kp, _) in servo_runs().items()}
+    diagnosis = diagnosed()
+    named = [f["effect"] for f in diagnosis["findings"]]
+    seen, judged = (stacked([x for x in runs.values() if (x[0] == JUDGED) == later]) for later in (False, True))
+    laws: dict[str, tuple[str, ...]] = {"Coulomb and viscous friction": COULOMB_AND_VISCOUS}
+    if "load_dependent_friction" in named:
+        laws["with load-dependent friction, as named"] = (*COULOMB_AND_VISCOUS, "load")
+    simulation = {
+        law: [judgement(servo, free, seen, judged) for servo in refitted(free, seen, config)]
+        for law, free in laws.items()
+    }
+    return {
+        **{key: diagnosis[key] for key in ("verdict", "summary", "findings", "unexplained", "fit")},
+        "simulation": simulation, "goal": GOAL,
+    }  # fmt: skip
+
+
+def judgement(servo: Servo, free: Sequence[str], seen: Run, judged: Run) -> dict:
+    """Numbers and errors of one optimum."""
+    trajectories = [trajectory for kp, trajectory in servo_runs().values() if kp == JUDGED]
+    return {
+        "numbers": {name: float(getattr(servo, name)) for name in free},
+        "error_seen": float(jnp.mean(error(servo, seen))),
+        "error_judged": float(jnp.mean(error(servo, judged))),
+        "by_trajectory": dict(zip(trajectories, np.asarray(error(servo, judged)).tolist(), strict=True)),
+    }
+
+
+def main() -> None:
+    config = tyro.cli(Config)
+    set_up_compilation_cache()
+    result = run(config)
+    config.out.mkdir(parents=True, exist_ok=True)
+    path = config.out / "real_bam_xl330.json"
+    path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    print(result["summary"])
+    for law, optima in result["simulation"].items():
+        for row in optima:
+            print(f"{law}: {row['error_judged']:.4f} rad unseen, {row['error_seen']:.4f} seen, goal {GOAL}")
+    print(path)
+
+
+if __name__ == "__main__":
+    main()
