@@ -44,6 +44,7 @@ def table(metrics: dict[str, float]) -> str:
 def page(results: dict) -> str:
     """README.md of this folder, out of the results alone."""
     made = ", ".join(f"{name} {value}" for name, value in results["machine"].items())
+    short = "; ".join(results["failures"]) or "nothing"
     return (
         "# Benchmarks\n\n"
         "Written by `python benchmarks/run.py` (needs the extra `bench`); don't edit.\n\n"
@@ -55,10 +56,10 @@ def page(results: dict) -> str:
         "Coriolis, sliding mode, against `mujoco.rollout` of the same arm, no controller, limits or friction. "
         "`runge_kutta`: the same by Runge-Kutta of order 4, against diffrax's Tsit5 at the same fixed step, on the "
         "equations in arrays and on our own in scalars; `evaluation`: the closed loop once, in ours (four a step), an "
-        "Euler step (one) and diffrax on our equations (six). These are alike, so all the time is the equations', and "
-        "on the same ones no integrator can be much more than six to four ahead. `swarms`: the study's PSO and angle "
+        "Euler step (one) and diffrax on our equations (six), all that a step costs included: as far as these are near "
+        "each other the time is the equations', and on the same ones little but six to four is left to gain. `swarms`: the study's PSO and angle "
         "QPSO one after the other, 30 seeds x 120 particles x 150 iterations of 27 unknowns; pyswarms loops over the "
         "seeds, evosax draws two random numbers a particle where ours draws two an unknown, and keeps no history; "
         "`torque_over_distance`: the same sweep on the "
-        f"torque of 2000 samples.\n\n{made}\n\n{table(results['metrics'])}\n"
+        f"torque of 2000 samples.\n\n{made}\n\nMissed in this run: {short}.\n\n{table(results['metrics'])}\n"
     )

@@ -87,8 +87,8 @@ def runge_kutta(robot: Robot) -> dict[str, float]:
     """Runge-Kutta of order 4 against diffrax's Tsit5 at the same fixed step, on the same equations.
 
     Twice: diffrax on the equations in arrays, as one writes them for it, and on our own in scalars, which shows how
-    much of the ratio is theirs.  Beside it what one evaluation of the loop takes in each, and in an Euler step: where
-    they are alike the integrators cost nothing, and the second ratio is that of the numbers of evaluations.
+    much of the ratio is theirs.  Beside it what one evaluation of the loop takes in each, and in an Euler step: as far
+    as they are alike the integrators cost nothing, and the second ratio is that of the numbers of evaluations.
     """
     import diffrax
 
