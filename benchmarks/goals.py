@@ -57,9 +57,10 @@ def page(results: dict) -> str:
         "`runge_kutta`: the same by Runge-Kutta of order 4, against diffrax's Tsit5 at the same fixed step, on the "
         "equations in arrays and on our own in scalars; `evaluation`: the closed loop once, in ours (four a step), an "
         "Euler step (one) and diffrax on our equations (six), all that a step costs included: as far as these are near "
-        "each other the time is the equations', and on the same ones little but six to four is left to gain. `swarms`: the study's PSO and angle "
-        "QPSO one after the other, 30 seeds x 120 particles x 150 iterations of 27 unknowns; pyswarms loops over the "
-        "seeds, evosax draws two random numbers a particle where ours draws two an unknown, and keeps no history; "
+        "each other the time is the equations', and on the same ones little but six to four is left to gain. "
+        "`swarms`: the study's PSO and angle QPSO one after the other, 30 seeds x 120 particles x 150 iterations of 27 "
+        "unknowns; pyswarms loops over the seeds, evosax draws two random numbers a particle where ours draws two an "
+        "unknown, and keeps no history; "
         "`torque_over_distance`: the same sweep on the "
         f"torque of 2000 samples.\n\n{made}\n\nMissed in this run: {short}.\n\n{table(results['metrics'])}\n"
     )
