@@ -20,7 +20,7 @@ class ActuatorLag(AbstractEffect):
         "joint_elasticity": "a chirp through the first resonance",
         "viscous_friction": "two excitation frequencies: the phase of a lag grows with frequency",
     }
-    transmission = True
+    logged = True
     needs = "fast changes of this joint's torque"
     history = "lets through what was asked for a moment before"
     steps = True

@@ -121,6 +121,7 @@ class AbstractEffect(abc.ABC):
         not_in_mjcf: What of it MJCF can't express and why, one sentence without its full stop; "" where nothing is.
         leans_on_inertials: Its torque is made of the rigid body's own, so it is known no better than the inertials.
         transmission: It acts before or inside the transmission, no part of what the links need on the motors' path.
+        logged: It is in what the log shows, not in what motors and links feel.
         once: It happens once, in one recording; nothing of it can be predicted from the others.
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
         scouts: Its grid of shapes is looked for in the residual (see `scout`).
@@ -150,6 +151,7 @@ class AbstractEffect(abc.ABC):
     not_in_mjcf: ClassVar[str] = "MJCF has no such torque"
     leans_on_inertials: ClassVar[bool] = False
     transmission: ClassVar[bool] = False
+    logged: ClassVar[bool] = False
     once: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
     scouts: ClassVar[bool] = False

@@ -6,7 +6,7 @@ import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
 
-HALVES = (-0.016, -0.008, 0.0, 0.008, 0.016)  # s: half of the delays that are tried; first order serves between them
+HALVES = tuple(0.004 * k for k in range(-4, 5))  # s: half of the delays that are tried; first order serves between them
 
 
 class TimeDelay(AbstractEffect):
@@ -26,7 +26,7 @@ class TimeDelay(AbstractEffect):
         "actuator_lag": "a delay acts on all joints alike",
         "viscous_friction": "two excitation frequencies: the phase of a delay grows with frequency",
     }
-    transmission = True
+    logged = True
     needs = "fast motion of several joints"
     everywhere = True
     history = "is in the clocks of the log, which shows a torque beside an earlier position"

@@ -169,21 +169,21 @@ class CorrectedRobot(AbstractPlant):
 
     def summed(self, motion: Motion, base: JointSamples, stepped) -> tuple[JointSamples, ...]:
         """Load, carried and total torque, and what is logged (see `model.Torques`)."""
-        friction, gain, load = jnp.zeros_like(base), jnp.zeros_like(base), base
+        friction, logged, load = jnp.zeros_like(base), jnp.zeros_like(base), base
         inside = self.motor_side(motion.qd, motion.qdd)
         for k, a in enumerate(self.effects):
             rows = jnp.arange(self.n) if a.effect.everywhere else jnp.array(a.joints)
             given = None if stepped is None else stepped[k]
             columns = a.effect.columns(motion, jnp.array(a.joints), a.shape) if given is None else given[None]
             part = jnp.zeros_like(base).at[:, rows].add(columns @ a.amplitudes)
-            if a.effect.slug == "torque_gain":
-                gain += part
+            if a.effect.logged:
+                logged += part
             elif a.effect.friction:
                 friction += part
             else:
                 load += part
                 inside += part if a.effect.transmission else 0.0
-        return load, load - inside, load + friction, load + friction + gain
+        return load, load - inside, load + friction, load + friction + logged
 
     def own_torque(self, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> JointSamples:
         """Rotors, friction and springs of the model as given."""

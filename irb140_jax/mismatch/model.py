@@ -75,10 +75,10 @@ class Torques:
     Attributes:
         nominal: Of the model as given.
         refit: Of the rigid body with refitted inertials.
-        load: What the transmissions carry: corrected rigid body and all effects but friction and gain.
+        load: What the transmissions carry: corrected rigid body and all effects but friction and what the log alone shows.
         carried: What of the load the links alone would need on the motors' path.
         total: Load and friction: what the motors really give.
-        corrected: What the controller logs: total and the wrong torque constants.
+        corrected: What the controller logs: total, by its torque constants, when and as it was asked for.
     """
 
     nominal: np.ndarray
@@ -129,18 +129,18 @@ def composed(
     """
     Y, nominal, inside, columns = along
     load = nominal + Y @ dphi_corrected
-    friction, gain = np.zeros_like(load), np.zeros_like(load)
+    friction, logged = np.zeros_like(load), np.zeros_like(load)
     for c, w in zip(candidates, amplitudes, strict=True):
         part = lib.torque(columns, c.columns, w)
-        if c.slug == "torque_gain":
-            gain += part
+        if c.effect.logged:
+            logged += part
         elif c.effect.friction:
             friction += part
         else:
             load = load + part
             inside = inside + part if c.effect.transmission else inside
     total = load + friction
-    return Torques(nominal, nominal + Y @ dphi_refit, load, load - inside, total, total + gain)
+    return Torques(nominal, nominal + Y @ dphi_refit, load, load - inside, total, total + logged)
 
 
 def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:

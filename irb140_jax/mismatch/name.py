@@ -162,7 +162,7 @@ def search(problem: Problem, start: tuple[int, ...] = ()) -> tuple[int, ...]:
     """
     chosen = _settled(problem, start)
     for _ in range(3):
-        settled = _split(problem, _settled(problem, _grown(problem, chosen)))
+        settled = _joined(problem, _split(problem, _settled(problem, _grown(problem, chosen))))
         if set(settled) == set(chosen):
             break
         chosen = settled
@@ -184,6 +184,24 @@ def _split(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
         new, old = (tuple(c for c in s if c not in both) for s in (other, chosen))
         if problem.odds(both, new) - len(new) * ACCEPT > problem.odds(both, old) - len(old) * ACCEPT:
             return other
+    return chosen
+
+
+def _joined(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    """Put one effect that acts on several joints in the place of one kind on each of them, where it explains more."""
+    everywhere = np.array([len(c.joints) > 1 for c in problem.candidates])
+    kinds = defaultdict(list)
+    for c in chosen:
+        if not everywhere[c] and not problem.candidates[c].effect.ordinary:
+            kinds[problem.candidates[c].slug].append(c)
+    for alike in kinds.values():
+        if len(alike) < 2:
+            continue
+        rest = tuple(c for c in chosen if c not in alike)
+        scores = np.where(everywhere & ~conflicts(problem, rest), problem.scores(rest), -np.inf)
+        best = int(np.argmax(scores))
+        if scores[best] - ACCEPT > problem.odds(rest, alike) - len(alike) * ACCEPT:
+            return _settled(problem, (*rest, best))
     return chosen
 
 
