@@ -75,7 +75,7 @@ class Torques:
     Attributes:
         nominal: Of the model as given.
         refit: Of the rigid body with refitted inertials.
-        load: What the transmissions carry: corrected rigid body and all effects but friction and what the log alone shows.
+        load: What the transmissions carry: corrected rigid body, all effects but friction and what only the log shows.
         carried: What of the load the links alone would need on the motors' path.
         total: Load and friction: what the motors really give.
         corrected: What the controller logs: total, by its torque constants, when and as it was asked for.
