@@ -70,9 +70,9 @@ def gears(results: dict) -> list[str]:
         "## Cycloidal gears, output bolted down (`cycloidal_play`)", "",
         "| run | play named [arc-min] | published | named beside it |", "|---|---|---|---|", *rows, "",
         f"The published gaps are met within {max(off):.0f} arc-minutes (goal 10). They come from a spring, dry",
-        "friction and a dead zone; where the diagnosis also finds friction that springs before it slips, such a fit counts that",
-        "as play. `12pre` runs are preloaded, and no play may be named there. Small changes of the noise level turn",
-        "what is named beside the play.",
+        "friction and a dead zone; where the diagnosis also finds friction that springs before it slips, such a",
+        "fit counts that as play. `12pre` runs are preloaded, and no play may be named there. Small changes of the",
+        "noise level turn what is named beside the play.",
     ]  # fmt: skip
 
 

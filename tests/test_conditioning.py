@@ -12,7 +12,8 @@ from irb140_jax import dynamics
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.model import CorrectedModel, Named, predict
-from irb140_jax.recordings.condition import Band, choose_band, condition
+from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 
 BAND = Band(torque=15.0, position=24.0, rate=200.0, step=5)

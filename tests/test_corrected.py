@@ -22,8 +22,9 @@ from irb140_jax.mismatch.native import NOTES, XML, native_robot, save_native
 from irb140_jax.recordings import Recording, read_recording
 from irb140_jax.recordings.conceal import random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec, rigid_torque
-from irb140_jax.recordings.condition import Band, Conditioned
+from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.excite import fourier_motion
+from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import load_robot, robot_from_model, robot_mjcf
 from irb140_jax.simulate import play
 

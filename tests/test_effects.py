@@ -19,7 +19,7 @@ from irb140_jax.effects import Motion, RigidBody, Scales
 from irb140_jax.effects.catalogue import CATALOGUE, _found
 from irb140_jax.mismatch.model import CorrectedModel, Named, predict
 from irb140_jax.recordings.concealed.catalogue import HIDDEN
-from irb140_jax.recordings.condition import Band
+from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import robot_from_model
 

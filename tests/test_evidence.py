@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy import signal, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.candidates import Candidate, Stretch
+from irb140_jax.mismatch.along import Stretch
+from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.evidence import eliminated, gain_of, gains, grams, layouts, posterior
 from irb140_jax.mismatch.noise import ORDER, Noise, noise_from_residuals
 

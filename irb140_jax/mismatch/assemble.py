@@ -5,10 +5,11 @@ import dataclasses
 import numpy as np
 
 from irb140_jax.effects import AbstractEffect
-from irb140_jax.mismatch.candidates import Candidate, Library, Stretch
+from irb140_jax.mismatch.along import Stretch
+from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.evidence import Grams, eliminated, grams
-from irb140_jax.mismatch.name import Problem
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
+from irb140_jax.mismatch.problem import Problem
 
 TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a share of the joint's torque
 LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty

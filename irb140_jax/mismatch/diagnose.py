@@ -12,7 +12,7 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
-from irb140_jax.mismatch.candidates import scales_of
+from irb140_jax.mismatch.along import scales_of
 from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior
 from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
@@ -21,7 +21,8 @@ from irb140_jax.mismatch.testable import Site, not_testable, reference, visibili
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
 from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
-from irb140_jax.recordings.condition import Band, choose_band, condition
+from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 

@@ -16,7 +16,8 @@ from functools import partial
 import numpy as np
 from scipy import linalg
 
-from irb140_jax.mismatch.candidates import Candidate, Stretch
+from irb140_jax.mismatch.along import Stretch
+from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.noise import Noise
 
 ROUNDING = 1e-12  # relative; a log of nonsense can make columns that are equal to a dozen digits

@@ -6,27 +6,18 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from irb140_jax.effects import AbstractEffect, Scales
+from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by, stretch
 from irb140_jax.mismatch.assemble import Data, assemble, first_noise, problem
-from irb140_jax.mismatch.candidates import (
-    Candidate,
-    Library,
-    Loads,
-    Prepared,
-    columns_along,
-    library,
-    prepared,
-    reshaped,
-    scales_of,
-    seen_by,
-    stretch,
-)
+from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
 from irb140_jax.mismatch.model import Named, better_known, composed
-from irb140_jax.mismatch.name import Problem, search
+from irb140_jax.mismatch.name import search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
+from irb140_jax.mismatch.problem import Problem
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
-from irb140_jax.recordings.condition import Band, Conditioned
+from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
 PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both

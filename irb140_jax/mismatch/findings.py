@@ -9,7 +9,8 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.explain import Explanation, full_posterior
-from irb140_jax.mismatch.name import PREFER, group_odds
+from irb140_jax.mismatch.name import PREFER
+from irb140_jax.mismatch.problem import group_odds
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
 from irb140_jax.robot import Robot
 

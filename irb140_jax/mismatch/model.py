@@ -11,16 +11,10 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.candidates import (
-    Candidate,
-    Columns,
-    Library,
-    Loads,
-    columns_along,
-    prepared,
-    seen_by,
-)
-from irb140_jax.recordings.condition import Band, Conditioned, condition
+from irb140_jax.mismatch.along import Columns, Loads, columns_along, prepared, seen_by
+from irb140_jax.mismatch.candidates import Candidate, Library
+from irb140_jax.recordings.condition import Conditioned, condition
+from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot, with_phi
 

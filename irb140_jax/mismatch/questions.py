@@ -6,8 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.along import prepared, stretch
 from irb140_jax.mismatch.assemble import LOOSE_STD
-from irb140_jax.mismatch.candidates import Library, prepared, stretch
+from irb140_jax.mismatch.candidates import Library
 from irb140_jax.mismatch.evidence import eliminated, gain_of, grams, posterior
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor

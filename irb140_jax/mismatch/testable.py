@@ -12,7 +12,8 @@ from scipy import ndimage
 
 from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.candidates import Library, columns_along, prepared
+from irb140_jax.mismatch.along import columns_along, prepared
+from irb140_jax.mismatch.candidates import Library
 from irb140_jax.mismatch.evidence import eliminated
 from irb140_jax.mismatch.explain import Explanation
 from irb140_jax.recordings.condition import Conditioned

@@ -15,7 +15,7 @@ from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.explain import Explanation
 from irb140_jax.mismatch.testable import REFERENCE_SHARE, VISIBLE, Reference, Site
-from irb140_jax.recordings.condition import Band
+from irb140_jax.recordings.low_pass import Band
 
 FILE = "undecided.npz"
 UNKNOWN_NOISE = 0.01  # of a joint's torque on a lively motion: what current sensors of arms have

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from irb140_jax.mismatch.candidates import Stretch
+from irb140_jax.mismatch.along import Stretch
 from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.prove import HeldOut
 

@@ -1,0 +1,159 @@
+"""What a search needs of the data: the odds of any set of candidates, from Gram matrices alone."""
+
+import dataclasses
+from collections import defaultdict
+from collections.abc import Collection, Iterable
+from functools import cached_property
+
+import numpy as np
+
+from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.evidence import Layout, gain_of, gains, layouts, posterior, with_prior
+
+LEAST_SHARE = 0.005  # an effect below this share of its joint's torque is within what smoothing and geometry feign
+
+
+@dataclasses.dataclass(frozen=True)
+class Neighbourhood:
+    """Candidates near some joints: which, their columns in the Gram matrix, and groups numbered within those."""
+
+    which: np.ndarray
+    columns: np.ndarray
+    groups: tuple[Layout, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Problem:
+    """Everything the search needs; no data, only Gram matrices.
+
+    Attributes:
+        H: Gram matrix over [nuisances | amplitudes | y], nuisances eliminated, shape (K + 1, K + 1).
+        per_joint: Gram matrices of each joint's rows before elimination, shape (n, K + 1, K + 1).
+        torque_energy: Squared whitened logged torque of each joint, shape (n,).
+        candidates: What may be in the set.
+        offset: Column of the first amplitude.
+        log_prior: Log prior odds of each candidate beside its rivals, shape (len(candidates),).
+        entry: Log odds that a candidate lacks to enter where nothing was: ordinary effects are likely rivals of others,
+            but no likelier to be found by chance.
+        lowest, highest: Admissible amplitudes in prior units, per candidate, padded with -inf and inf.
+        summed, least: Weights of the amplitudes in a sum that is bounded from below, and its bound, per candidate.
+    """
+
+    H: np.ndarray
+    per_joint: np.ndarray
+    torque_energy: np.ndarray
+    candidates: tuple[Candidate, ...]
+    offset: int
+    log_prior: np.ndarray
+    entry: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
+    summed: np.ndarray
+    least: np.ndarray
+
+    def columns(self, chosen: tuple[int, ...]) -> np.ndarray:
+        """Columns of H that a set uses."""
+        parts = [self.candidates[c].columns + self.offset for c in chosen]
+        return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
+
+    @cached_property
+    def groups(self) -> tuple[Layout, ...]:
+        """All candidates, in groups of equal size."""
+        return layouts(self.candidates, self.offset)
+
+    @cached_property
+    def at_joint(self) -> np.ndarray:
+        """Which candidates touch which joint, shape (n, candidates)."""
+        touches = np.zeros((len(self.per_joint), len(self.candidates)), dtype=bool)
+        for i, c in enumerate(self.candidates):
+            touches[list(c.joints), i] = True
+        return touches
+
+    def scores(self, chosen: tuple[int, ...], joints: Collection[int] | None = None) -> np.ndarray:
+        """Log posterior odds of adding each candidate to a set; -inf where its amplitudes would be inadmissible.
+
+        Args:
+            chosen: The set.
+            joints: Only candidates that touch these joints, -inf for the rest; all by default.
+        """
+        near = self.neighbourhood(frozenset(joints) if joints is not None else None)
+        H = self.eliminated_near(chosen, near.columns)
+        gain, mean = gains(H, near.groups, len(self.candidates), self.lowest.shape[1])
+        with np.errstate(invalid="ignore"):
+            bad = np.any((mean < self.lowest - 1e-9) | (mean > self.highest + 1e-9), axis=1)
+        bad |= np.nansum(mean * self.summed, axis=1) < self.least
+        return np.where(bad | (self._share(mean) < LEAST_SHARE), -np.inf, gain + self.log_prior)
+
+    def eliminated_near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
+        """Gram matrix of some columns and y, with a set eliminated."""
+        index = np.append(columns, self.H.shape[0] - 1)
+        H = self.H[np.ix_(index, index)]
+        c = self.columns(chosen)
+        if len(c) == 0:
+            return H
+        half = np.linalg.solve(np.linalg.cholesky(with_prior(self.H[np.ix_(c, c)])), self.H[np.ix_(c, index)])
+        return H - half.T @ half
+
+    def neighbourhood(self, joints: frozenset[int] | None) -> "Neighbourhood":
+        """Candidates that touch some joints, with their columns numbered among themselves."""
+        if joints not in self._neighbourhoods:
+            which = np.arange(len(self.candidates))
+            if joints is not None:
+                which = np.flatnonzero(self.at_joint[sorted(joints)].reshape(len(joints), -1).any(axis=0))
+            columns = np.unique(np.concatenate([self.candidates[i].columns for i in which])) + self.offset
+            number = {int(c): k for k, c in enumerate(columns)}
+            groups: dict[int, list[int]] = defaultdict(list)
+            for i in which:
+                groups[len(self.candidates[i].columns)].append(int(i))
+            local = lambda i: [number[int(c + self.offset)] for c in self.candidates[i].columns]  # noqa: E731
+            layout = tuple(Layout(np.array(m), np.array([local(i) for i in m])) for m in groups.values())
+            self._neighbourhoods[joints] = Neighbourhood(which, columns, layout)
+        return self._neighbourhoods[joints]
+
+    @cached_property
+    def _neighbourhoods(self) -> dict[frozenset[int] | None, "Neighbourhood"]:
+        return {}
+
+    def _share(self, mean: np.ndarray) -> np.ndarray:
+        """Torque of each candidate with these amplitudes, as a share of the torque of the joint it matters most to."""
+        share = np.zeros(len(self.candidates))
+        for g, G in zip(self.groups, self._own_grams, strict=True):
+            k = g.columns.shape[1]
+            v = np.nan_to_num(mean[g.which, :k])
+            energy = np.einsum("ik,jikl,il->ji", v, G, v)
+            share[g.which] = np.sqrt(np.max(energy / self.torque_energy[:, None], axis=0))
+        return share
+
+    @cached_property
+    def _own_grams(self) -> list[np.ndarray]:
+        """Gram matrix of each candidate's own columns at each joint, per group, shape (n, members, k, k)."""
+        return [self.per_joint[:, g.columns[:, :, None], g.columns[:, None, :]] for g in self.groups]
+
+    def odds(self, rest: tuple[int, ...], chosen: Iterable[int]) -> float:
+        """Log posterior odds of adding some candidates to a set."""
+        chosen = tuple(chosen)
+        if not chosen:
+            return 0.0
+        columns = self.columns(chosen)
+        H = self.eliminated_near(rest, columns)
+        return gain_of(H, np.arange(len(columns))) + float(sum(self.log_prior[c] for c in chosen))
+
+    def explained(self, chosen: tuple[int, ...], *, friction: bool = False) -> np.ndarray:
+        """Half the whitened squared torque that a set, or the friction in it, explains at each joint, shape (n,)."""
+        index = self.columns(chosen)
+        if len(index) == 0:
+            return np.zeros(len(self.per_joint))
+        members = [self.candidates[c] for c in chosen]
+        counts = np.concatenate([np.full(len(m.columns), m.effect.friction or not friction) for m in members])
+        v = np.where(counts, posterior(self.H, index).mean, 0.0)
+        explained = np.einsum("i,jik,k->j", v, self.per_joint[:, index[:, None], index[None, :]], v)
+        return 0.5 * explained
+
+
+def group_odds(problem: Problem, chosen: tuple[int, ...]) -> dict[tuple[str, tuple[int, ...]], float]:
+    """Best log odds of adding each effect at each site to a set, over its shapes and variants."""
+    odds: dict[tuple[str, tuple[int, ...]], float] = {}
+    for score, c in zip(problem.scores(chosen), problem.candidates, strict=True):
+        key = (c.slug, c.joints)
+        odds[key] = max(odds.get(key, -np.inf), float(score))
+    return odds

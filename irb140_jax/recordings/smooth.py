@@ -1,0 +1,104 @@
+"""The noise of logged positions, and Wiener's smoother that takes it out before they are differentiated."""
+
+import numpy as np
+from scipy import ndimage, signal
+from scipy.signal import windows
+
+from irb140_jax.recordings.recording import Recording
+
+CERTAIN = 1.5  # times the noise that a spectrum must exceed before any of it counts as signal: its own scatter
+
+
+def without_noise(
+    q: np.ndarray, white: np.ndarray, rate: float, h1: np.ndarray, *, resampled: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Wiener's smoother: every frequency of every joint's position weighted by the share of it that is signal.
+
+    What is optimal for q is so for its derivatives too.  Without it, encoder noise between the motion's highest
+    frequency and the band's would fill qdd.
+
+    Args:
+        q: Positions on an even grid, shape (T, n).
+        white: Power density of their white noise [rad^2/Hz or m^2/Hz], shape (n,).
+        rate: Samples per second.
+        h1: Taps of the differentiator that follows.
+        resampled: Whether the spectrum's top no longer shows the noise.
+
+    Returns:
+        Positions, shape (T, n), and the standard deviation of the noise in their speeds, shape (n,).
+
+    Source: N. Wiener, Extrapolation, Interpolation and Smoothing of Stationary Time Series, 1949.
+    """
+    reach = min(len(q) - 1, int(2.0 * rate))
+    longer = np.pad(q, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
+    trend = np.linspace(0.0, 1.0, len(longer))[:, None] * (longer[-1] - longer[0]) + longer[0]
+    spectrum = np.fft.rfft(longer - trend, axis=0)
+    f = np.fft.rfftfreq(len(longer), 1.0 / rate)
+    out, noise = np.empty_like(q), np.zeros(q.shape[1])
+    for j in range(q.shape[1]):
+        share, floor, at = _signal_share(q[:, j], white[j] if resampled else 0.0, rate)
+        weight = np.interp(f, at, share)
+        out[:, j] = (np.fft.irfft(spectrum[:, j] * weight, len(longer)) + trend[:, j])[reach : reach + len(q)]
+        response = np.abs(np.fft.rfft(h1, 8192)) * np.interp(np.fft.rfftfreq(8192, 1.0 / rate), at, share)
+        # Jerks fill the top of the spectrum, but few samples.
+        floor = min(floor, white[j])
+        noise[j] = np.sqrt(floor * np.sum(response**2) * rate / 8192)
+    return out, noise
+
+
+def _signal_share(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, float, np.ndarray]:
+    """Share of the signal in a position's power at each frequency, density of its white noise, frequencies [Hz]."""
+    f, p, floor = spectrum_of(x, density, rate)
+    smooth = ndimage.uniform_filter1d(p, 5, mode="nearest")
+    share = np.clip(1.0 - CERTAIN * floor / np.maximum(smooth, 1e-300), 0.0, 1.0)
+    share[f < 1.0] = 1.0  # below, windows of four seconds can't tell
+    return share, floor, f
+
+
+def spectrum_of(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Frequencies [Hz], power density of a position, and that of its white noise: as known, or as seen at the top."""
+    window = windows.kaiser(min(len(x), int(4 * rate)), 14.0)
+    f, p = signal.welch(x, rate, window=window, detrend="linear")
+    return f, p, max(float(np.median(p[f > 0.6 * f[-1]])), density)
+
+
+def noise_density(recording: Recording, even: np.ndarray, rate: float) -> np.ndarray:
+    """Power density of the white noise in positions that had to be resampled [rad^2/Hz or m^2/Hz], else 0, shape (n,).
+
+    Resampling smooths the noise, so that its spectrum's top no longer shows it.
+    """
+    if even is recording.t:
+        return np.zeros(recording.q.shape[1])
+    return white_density(recording, rate)
+
+
+def white_density(recording: Recording, rate: float) -> np.ndarray:
+    """Power density of the white noise in positions at this rate [rad^2/Hz or m^2/Hz], shape (n,)."""
+    return np.array([2.0 * white_noise(recording.t, x) ** 2 / rate for x in recording.q.T])
+
+
+def white_noise(t: np.ndarray, x: np.ndarray) -> float:
+    """Standard deviation of the white part of a smooth signal, unevenly sampled or not.
+
+    Every sample is compared with the quintic through its six neighbours; the median is robust to the signal.
+    """
+    if len(x) < 20:
+        return 0.0
+    places, last = (0, 1, 2, 4, 5, 6), len(x) - 6
+    near = [t[i : last + i] - t[3:-3] for i in places]
+    weights = np.stack([
+        np.prod([near[m] / (near[m] - near[k]) for m in range(6) if m != k], axis=0) for k in range(6)
+    ])  # fmt: skip
+    values = np.stack([x[i : last + i] for i in places])
+    off = (x[3:-3] - np.sum(weights * values, axis=0)) / np.sqrt(1.0 + np.sum(weights**2, axis=0))
+    moving = off[np.ptp(values, axis=0) > 0]  # at rest, a coarse encoder shows no noise
+    return float(np.median(np.abs(moving)) / 0.6745) if len(moving) > 10 else 0.0
+
+
+def signal_limit(x: np.ndarray, density: float, rate: float) -> float:
+    """Frequency [Hz] up to which a position's spectrum stands above its noise; 0 for a joint at rest."""
+    if np.ptp(x) == 0:
+        return 0.0
+    f, p, floor = spectrum_of(x, density, rate)
+    above = np.flatnonzero(p > 10.0 * floor)
+    return float(f[above[-1]]) if len(above) else 0.0
