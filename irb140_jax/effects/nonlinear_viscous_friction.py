@@ -13,7 +13,7 @@ class NonlinearViscousFriction(AbstractEffect):
     title = "viscous friction that bends with speed"
     equation = "k |qd|^a sign(qd)"
     source = "Waiboer, Aarts, Jonker, Multibody System Dynamics 14, 2005; Bittencourt et al., IROS 2010"
-    parameters = (Parameter("coefficient", "{tau} (s/{q})^a", low=0.0), Parameter("exponent", "1", low=0.3, high=3.0))
+    parameters = (Parameter("coefficient", "{tau} (s/{q})^a", low=0.0), Parameter("exponent", "1", low=0.4, high=3.0))
     contains = ("viscous_friction",)
     absorbs = False  # k |qd|^a + d qd has no exponent of its own
     variants = ((0,),)
@@ -29,7 +29,7 @@ class NonlinearViscousFriction(AbstractEffect):
     not_in_mjcf = "it is left out: joint damping is in proportion to speed"
 
     def shapes(self, scales, joints):
-        return np.array([0.3, 0.4, 0.5, 0.65, 0.8, 1.3, 1.6, 1.9, 2.3, 3.0])[:, None]
+        return np.array([0.4, 0.5, 0.65, 0.8, 1.3, 1.6, 1.9, 2.3, 3.0])[:, None]
 
     def refines(self):
         return True
