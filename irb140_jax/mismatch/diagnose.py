@@ -13,7 +13,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
 from irb140_jax.mismatch.along import scales_of
-from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior
+from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior, withdrawn
 from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, refitted, transferring
@@ -105,7 +105,7 @@ def _diagnosed(
     rest = unexplained(ex, proof)
     doubtful = {c for u in rest for c in u.doubtful}
     if doubtful:  # names that only stand in for what has none
-        ex = dataclasses.replace(ex, chosen=tuple(c for c in ex.chosen if c not in doubtful))
+        ex = withdrawn(ex, doubtful)
         proof = held_out(ex, refit)
         rest = unexplained(ex, proof)
     found = findings(robot, ex)

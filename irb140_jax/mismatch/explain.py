@@ -1,7 +1,7 @@
 """The loop at the heart of a diagnosis: columns, noise, search, and again with finer shapes and the corrected load."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
@@ -109,6 +109,14 @@ def _settled(lib: Library, data: Data, factor: np.ndarray, chosen: tuple[int, ..
         del prob, g  # hundreds of megabytes, before the next are made
     prob, g = problem(data, noise)
     return Explanation(lib, data, noise, prob, g, search(prob, chosen), factor)
+
+
+def withdrawn(ex: Explanation, names: Collection[int]) -> Explanation:
+    """The explanation without some candidates, weighted by the noise that it then leaves."""
+    chosen = tuple(c for c in ex.chosen if c not in names)
+    noise = _noise_under(ex.data, ex.problem, ex.grams, chosen)
+    prob, g = problem(ex.data, noise)
+    return dataclasses.replace(ex, noise=noise, problem=prob, grams=g, chosen=chosen)
 
 
 def full_posterior(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without=None) -> Posterior:
