@@ -16,6 +16,7 @@ import sys
 from importlib.metadata import version
 
 import cases
+import diagnosis_cases
 import rollout_cases
 import swarm_cases
 from goals import GOALS, missed, page, table
@@ -24,7 +25,7 @@ from irb140_jax.robot import load_robot
 
 CASES = (
     cases.inverse_dynamics, cases.paper_style, cases.identification, rollout_cases.rollouts, rollout_cases.runge_kutta,
-    swarm_cases.swarms,
+    swarm_cases.swarms, diagnosis_cases.diagnosis,
 )  # fmt: skip
 HERE = pathlib.Path(__file__).parent
 

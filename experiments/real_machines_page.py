@@ -11,7 +11,10 @@ import numpy as np
 import tyro
 
 PAGE = pathlib.Path(__file__).resolve().parents[1] / "docs" / "real-machines.md"
-PUBLISHED = {"Coulomb and viscous friction": 0.0588, "with load-dependent friction, as named": 0.0325}  # rad
+PUBLISHED = {
+    "Coulomb and viscous friction": 0.0588, "with load-dependent friction, as named": 0.0325,
+    "the same, within what the torque says of it": 0.0325,
+}  # fmt: skip  # rad
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,7 +40,7 @@ def servo(result: dict) -> list[str]:
         for law, optima in result["simulation"].items() for optimum in optima
     ]  # fmt: skip
     judged = [optima[0]["error_judged"] for optima in result["simulation"].values()]
-    reached = "reached" if judged[-1] <= result["goal"] else "not reached by it, only by others, which fit worse"
+    reached = ["reached" if x <= result["goal"] else "not reached" for x in judged]
     rest = "; ".join(u["where"] for u in result["unexplained"]) or "nothing that repeats"
     return [
         "## A hobby servo with a pendulum (`bam_xl330`)", "",
@@ -47,11 +50,13 @@ def servo(result: dict) -> list[str]:
         f"On torque that the fit did not see, the error goes from {fit['rmse_nominal']:.3g} N m (model as given) over",
         f"{fit['rmse_refit']:.3g} (inertials refitted) to {fit['rmse_corrected']:.3g} N m. What is left: {rest}.", "",
         "Then the position loop is simulated with the published drive, and the numbers are refitted to the positions",
-        "of the twelve runs, from five starts. Every optimum, the best on the runs seen first; mean absolute errors",
-        "in rad:", "",
+        "of the twelve runs, from five starts: freely, and with the load's friction within three standard deviations",
+        "of what was named. Every optimum, the best on the runs seen first; mean absolute errors in rad:", "",
         "| law | runs seen | runs judged | published |", "|---|---|---|---|", *rows, "",
-        f"The best optimum with load leaves {judged[-1] / judged[0]:.2f} of the error of Coulomb and viscous",
-        f"friction; the goal of {result['goal']} rad is {reached}.",
+        f"Of the error of Coulomb and viscous friction the best optimum leaves {judged[1] / judged[0]:.2f} freely, and",
+        f"{judged[2] / judged[0]:.2f} within what the torque says; the goal of {result['goal']} rad is {reached[1]}",
+        f"freely, and {reached[2]} within. In positions alone, one swing that falls to the wrong side of an unstable",
+        "posture outweighs all else, and draws the numbers away from those of the torque.",
     ]  # fmt: skip
 
 

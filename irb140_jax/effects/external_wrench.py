@@ -9,7 +9,7 @@ from scipy import optimize
 from irb140_jax.effects.base import AbstractEffect, Parameter
 
 RISE = 0.05  # s in which a push begins and ends
-BLUR = 0.03  # s: standard deviation of when a push begins, whatever its rise
+BLUR = 0.035  # s: standard deviation of when a push begins and ends, as it may take up to 0.1 s to do so
 EDGES = 32  # instants per recording at which a push may begin or end in the first scan
 LONGEST = 0.4  # of a recording; what lasts longer is no event
 SHORTEST = 0.2  # s; what lasts less is a blow, or a misfit
@@ -73,10 +73,14 @@ class ExternalWrench(AbstractEffect):
             rows = left.recording == recording
             t, J = left.t[rows], left.tool_jacobian[rows]
             edges = np.linspace(t[0], t[-1], EDGES)
-            spans = [s for s in itertools.combinations(edges, 2) if SHORTEST < s[1] - s[0] < LONGEST * (t[-1] - t[0])]
+            spans = np.array([
+                s for s in itertools.combinations(edges, 2) if SHORTEST < s[1] - s[0] < LONGEST * (t[-1] - t[0])
+            ])  # fmt: skip
+            if len(spans) == 0:
+                continue
+            first, last = np.searchsorted(t, spans.T)
+            start = spans[np.argmax(left.gains_within(-J, first, last, rows))]
             column = lambda span: -_window(t, span[0], span[1], np)[:, None, None] * J  # noqa: B023, E731
-            gains = left.gains(np.stack([column(s) for s in spans]), rows)[0]
-            start = spans[int(np.argmax(gains))]
             # A short simplex search moves both ends off the coarse grid.
             simplex = np.add(start, [[0, 0], [0.3, 0], [0, 0.3]])
             at = optimize.minimize(

@@ -62,13 +62,34 @@ class LeftOver:
         C, _, _, k = columns.shape
         flat = (columns * self.weight[part][..., None]).reshape(C, -1, k)
         B, y = self.known[part].reshape(-1, self.known.shape[-1]), self.y[part].ravel()
-        half, b = self._half
         stacked = flat.transpose(1, 0, 2).reshape(len(y), C * k)
-        shared = linalg.solve_triangular(half, B.T @ stacked, lower=True)
         own = np.einsum("cri,crj->cij", flat, flat)
-        parts = shared.reshape(-1, C, k)
-        G = own - np.einsum("mci,mcj->cij", parts, parts)
-        g = (stacked.T @ y - shared.T @ b).reshape(C, k)
+        return self._gained(own, (B.T @ stacked).reshape(-1, C, k), (stacked.T @ y).reshape(C, k))
+
+    def gains_within(
+        self, columns: Float[np.ndarray, "S n k"], first: Int[np.ndarray, " C"], last: Int[np.ndarray, " C"],
+        rows: Bool[np.ndarray, " R"],
+    ) -> Float[np.ndarray, " C"]:  # fmt: skip
+        """As `gains`, of candidates that are the same columns from one row up to another and zero elsewhere.
+
+        Args:
+            columns: Torque per unit of each amplitude [N m or N], shape (rows, n, k).
+            first, last: Each candidate's first row, and the one behind its last.
+            rows: Which rows those are.
+        """
+        white = columns * self.weight[rows][..., None]
+        pairs = ("tni,tnj->tij", white), ("tnj,tni->tij", self.known[rows]), ("tn,tni->ti", self.y[rows])
+        sums = [np.cumsum(np.einsum(how, other, white, optimize=True), axis=0) for how, other in pairs]
+        own, shared, told = (np.concatenate([np.zeros_like(x[:1]), x]) for x in sums)
+        between = lambda x: x[last] - x[first]  # noqa: E731
+        return self._gained(between(own), between(shared).transpose(2, 0, 1), between(told))[0]
+
+    def _gained(self, own: np.ndarray, shared: np.ndarray, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gains and amplitudes from products of columns with themselves, the known ones (m, C, k), and y."""
+        (half, b), (m, C, k) = self._half, shared.shape
+        parts = linalg.solve_triangular(half, shared.reshape(m, C * k), lower=True).reshape(m, C, k)
+        G = own - np.einsum("mci,mcj->cij", parts, parts, optimize=True)
+        g = told - np.einsum("mci,m->ci", parts, b)
         ridge = 1e-6 * np.trace(own, axis1=1, axis2=2)[:, None, None] * np.eye(k) + 1e-12 * np.eye(k)
         w = np.linalg.solve(G + ridge, g[..., None])[..., 0]
         return 0.5 * np.einsum("ci,ci->c", g, w), w

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from irb140_jax import dynamics, kinematics
+from irb140_jax.dynamics.chunks import in_chunks
 from irb140_jax.effects import Motion, RigidBody, Scales
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.mismatch.candidates import Library
@@ -20,15 +21,16 @@ from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 from irb140_jax.types import JointSamples
 
-CHUNK = 2048  # samples per compiled call: recordings of any length reuse one program
-POSTURES = 50  # of each recording, for mean inertias
 RUN_IN = 128  # samples in which effects with memory forget how their chunk began
+CHUNK = 1024 + RUN_IN  # samples per compiled call: recordings of any length reuse one program
+# Three directions of gravity without a zero or a one, which would each be a program of its own.
+PULLS = np.array([[2.0, 3.0, 5.0], [5.0, 2.0, 3.0], [3.0, 5.0, 2.0]])  # m/s^2
 
 
-def scales_of(recordings: Sequence[Conditioned], robot: Robot) -> Scales:
-    """Sizes over a set of conditioned recordings of a robot."""
-    q = np.concatenate([r.q[:: max(1, len(r.q) // POSTURES)] for r in recordings])
-    inertia = np.diagonal(_mass(robot, jnp.asarray(q)), axis1=1, axis2=2).mean(axis=0)
+def scales_of(along: Sequence["Prepared"]) -> Scales:
+    """Sizes over a set of recordings of a robot."""
+    recordings = [a.recording for a in along]
+    inertia = np.concatenate([np.diagonal(a.rigid.mass, axis1=1, axis2=2) for a in along]).mean(axis=0)
     return Scales(
         speed=np.max([np.abs(r.qd).max(axis=0) for r in recordings], axis=0),
         rest_speed=np.max([r.rest_speed for r in recordings], axis=0),
@@ -87,61 +89,58 @@ class Prepared(NamedTuple):
 
 def prepared(robot: Robot, recording: Conditioned) -> Prepared:
     """Evaluate the rigid body along a recording."""
-    q, qd, qdd = (jnp.asarray(x) for x in (recording.q, recording.qd, recording.qdd))
-    Y = np.asarray(dynamics.regressor_batch(robot, q, qd, qdd))
-    # Springs of the model pull at the link; rotors and friction are the motor's.
-    parts = lambda r: (r.armature, r.damping, r.frictionloss)  # noqa: E731
-    bare = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 3)
-    torque = lambda r, *x: np.asarray(dynamics.inverse_dynamics_batch(r, *x))  # noqa: E731
-    rest = torque(bare, q, qd, qdd)
-    weightless = _weightless(robot)
-    still = (q, 0.0 * qd, 0.0 * qdd)
-    by_gravity = np.stack(
-        [torque(eqx.tree_at(lambda r: r.gravity, weightless, jnp.eye(3)[k]), *still) for k in range(3)], axis=-1
-    )
-    unit = jnp.eye(robot.n)
-    by_q = np.stack([(torque(bare, q + STEP * e, qd, qdd) - rest) / STEP for e in unit], axis=-1)
-    by_qd = np.stack([(torque(bare, q, qd + STEP * e, qdd) - rest) / STEP for e in unit], axis=-1)
-    mass = _mass(robot, q)
-    size = np.linalg.norm(np.asarray(robot.gravity))
-    tool, tool_jacobian = (np.asarray(x) for x in _tool(robot, q))
-    sides = np.asarray(across(robot.gravity))
-    springs = np.asarray(robot.stiffness)
-    arrays = (by_gravity, size, sides, Y[..., -10:], by_q, by_qd, springs, mass, tool, tool_jacobian)
-    rigid = RigidBody(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
+    moving = (jnp.asarray(x) for x in (recording.q, recording.qd, recording.qdd))
+    Y = np.asarray(dynamics.regressor_batch(robot, *moving))
     motor_side = np.asarray(robot.armature) * recording.qdd + _friction(robot, recording)
     spring = np.asarray(robot.stiffness) * (recording.q - np.asarray(robot.springref))
     nominal = Y @ np.asarray(robot.phi).ravel() + motor_side + spring
-    return Prepared(recording, Y, nominal, motor_side, rigid)
+    return Prepared(recording, Y, nominal, motor_side, _sensitivities(robot, recording, Y[..., -10:]))
 
 
 def seen_by(robot: Robot, along: Prepared) -> Prepared:
     """The same with the sensitivities of a robot that is known better."""
-    return along._replace(rigid=prepared(robot, along.recording).rigid)
+    return along._replace(rigid=_sensitivities(robot, along.recording, along.Y[..., -10:]))
 
 
-def _weightless(robot: Robot) -> Robot:
-    """Links only, without gravity."""
-    none = jnp.zeros(robot.n)
-    parts = lambda r: (r.gravity, r.stiffness, r.armature, r.damping, r.frictionloss)  # noqa: E731
-    return eqx.tree_at(parts, robot, (jnp.zeros(3), *(none,) * 4))
+def _sensitivities(robot: Robot, recording: Conditioned, last_link: np.ndarray) -> RigidBody:
+    """See `RigidBody`.  Springs of the model pull at the link; rotors and friction are the motor's."""
+    q, qd, qdd = recording.q, recording.qd, recording.qdd
+    parts = lambda r: (r.armature, r.damping, r.frictionloss)  # noqa: E731
+    bare = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 3)
+    torque = partial(_torque, bare)
+    rest, still, unit = torque(q, qd, qdd), np.zeros_like(q), np.eye(robot.n)
+    by_q = np.stack([(torque(q + STEP * e, qd, qdd) - rest) / STEP for e in unit], axis=-1)
+    by_qd = np.stack([(torque(q, qd + STEP * e, qdd) - rest) / STEP for e in unit], axis=-1)
+    held = torque(q, still, still)
+    mass = np.stack([torque(q, still, still + e) - held for e in unit], axis=-1)
+    size = np.linalg.norm(np.asarray(robot.gravity))
+    tool, tool_jacobian = _tool(robot, q)
+    sides, springs = np.asarray(across(robot.gravity)), np.asarray(robot.stiffness)
+    arrays = (_by_gravity(bare, q), size, sides, last_link, by_q, by_qd, springs, mass, tool, tool_jacobian)
+    return RigidBody(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
 
 
-def _mass(robot: Robot, q: JointSamples) -> np.ndarray:
-    """Mass matrices of the links, shape (T, n, n)."""
-    links, still = _weightless(robot), jnp.zeros_like(q)
-    unit = jnp.eye(robot.n)
-    return np.stack(
-        [np.asarray(dynamics.inverse_dynamics_batch(links, q, still, still + e)) for e in unit], axis=-1
-    )
+def _by_gravity(bare: Robot, q: np.ndarray) -> np.ndarray:
+    """Torque per unit of each component of gravity, shape (T, n, 3)."""
+    links, still = eqx.tree_at(lambda r: r.stiffness, bare, jnp.zeros(bare.n)), np.zeros_like(q)
+    pulled = (eqx.tree_at(lambda r: r.gravity, links, jnp.asarray(g)) for g in PULLS)
+    return np.stack([_torque(r, q, still, still) for r in pulled], axis=-1) @ np.linalg.inv(PULLS.T)
 
 
-@eqx.filter_jit
-def _tool(robot: Robot, q: JointSamples) -> tuple[Float[Array, "T 3"], Float[Array, "T n 3"]]:
-    """Position of the tool in the world and its velocity per joint speed."""
+def _torque(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    return np.asarray(dynamics.inverse_dynamics_batch(robot, *(jnp.asarray(x) for x in (q, qd, qdd))))
+
+
+def _tool(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position of the tool in the world, (T, 3), and its velocity per joint speed, (T, n, 3)."""
+    both = np.asarray(in_chunks(_tool_of_chunk, robot, (jnp.asarray(q),)))
+    return both[:, 0], both[:, 1:]
+
+
+def _tool_of_chunk(robot: Robot, q: JointSamples) -> Float[Array, "T n+1 3"]:
     place = lambda x: kinematics.forward_kinematics(robot, x)[:3, 3]  # noqa: E731
     velocity = lambda x: kinematics.jacobian(robot, x)[:3].T  # noqa: E731
-    return jax.vmap(place)(q), jax.vmap(velocity)(q)
+    return jax.vmap(lambda x: jnp.concatenate([place(x)[None], velocity(x)]))(q)
 
 
 def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, recording: int = -1) -> Columns:
@@ -161,8 +160,9 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
     which = np.array(float(recording))
     whole = Motion(*moving, along.rigid, r.rest_speed, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
     per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)
-    parts = []
-    for start in range(0, len(r.t), CHUNK - RUN_IN):
+    sites, shapes = [b[1] for b in lib.blocks], [b[2] for b in lib.blocks]
+    out = np.empty((len(r.t), len(lib.entries[0])))
+    for start in range(0, max(len(r.t) - RUN_IN, 1), CHUNK - RUN_IN):
         pad = max(start + CHUNK - len(r.t), 0)
 
         def piece(x, of_time, start=start, pad=pad):
@@ -170,13 +170,10 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
                 return x
             return np.pad(x[start : start + CHUNK], ((0, pad),) + ((0, 0),) * (x.ndim - 1), mode="edge")
 
-        motion = jax.tree.map(piece, whole, per_sample)
-        sites, shapes = [b[1] for b in lib.blocks], [b[2] for b in lib.blocks]
-        effects = _columns(tuple(b[0] for b in lib.blocks), motion, sites, shapes)
-        parts.append(np.asarray(effects)[RUN_IN if start else 0 : CHUNK - pad])
-        if pad:
-            break
-    return Columns(along.Y, along.nominal, along.motor_side, np.concatenate(parts))
+        motion, run_in = jax.tree.map(piece, whole, per_sample), RUN_IN if start else 0
+        effects = np.asarray(_columns(tuple(b[0] for b in lib.blocks), motion, sites, shapes))
+        out[start + run_in : start + CHUNK] = effects[run_in : CHUNK - pad]
+    return Columns(along.Y, along.nominal, along.motor_side, out)
 
 
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
@@ -205,7 +202,8 @@ class Stretch:
         recording: Index of the recording it belongs to.
         t: Time of the rows [s], shape (R,).
         begin: Time at which the recording begins [s].
-        X: Columns [regressor | candidates] per joint, each (R, 10 n + size).
+        X: Columns [inertials | amplitudes | loose inertials] per joint, (R, n, 10 n + size + 10 n); inertials twice, in
+            units of their prior at relative standard deviation 1.
         y: Logged minus nominal torque per joint, (R, n).
         tau: Logged torque, low-passed, (R, n).
         nominal: Nominal torque, low-passed, (R, n).
@@ -229,13 +227,26 @@ class Stretch:
     tool_jacobian: np.ndarray
 
 
-def stretch(lib: Library, along: Prepared, index: int, band: Band, loads: Loads | None = None) -> Stretch:
-    """All columns of a recording through the common low-pass, at the kept samples."""
+def stretch(
+    lib: Library, along: Prepared, index: int, band: Band, factor: np.ndarray, loads: Loads | None = None
+) -> Stretch:
+    """All columns of a recording through the common low-pass, at the kept samples.
+
+    Args:
+        lib: The library.
+        along: The recording.
+        index: Its number.
+        band: Of the comparison.
+        factor: Square root of the inertial prior, shape (10 n, 10 n).
+        loads: See `columns_along`.
+    """
     Y, nominal, _, columns = columns_along(lib, along, loads, index)
-    recording = along.recording
+    recording, k = along.recording, len(factor)
     kept = band.kept(len(recording.t))
     nominal, tau = band.apply(nominal), band.apply(recording.tau)
-    X = np.concatenate([band.apply(Y), lib.spread(band.apply(columns))], axis=-1)
+    X = np.zeros((len(kept), lib.robot.n, k + lib.size + k))
+    X[..., :k] = X[..., -k:] = band.apply(Y) @ factor
+    lib.spread(band.apply(columns), X[..., k:-k])
     return Stretch(
         index, recording.t[kept], recording.began, X, tau - nominal, tau, nominal, recording.usable[kept],
         recording.q[kept], recording.qd[kept], recording.qdd[kept],

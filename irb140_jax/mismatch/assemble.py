@@ -60,24 +60,21 @@ class Data:
     nuisances: int
 
 
-def assemble(lib: Library, stretches: list[Stretch], factor: np.ndarray, uncertainty: float) -> Data:
-    """Put inertials into prior units, append the loose ones and set the prior scale of every amplitude.
+def assemble(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data:
+    """Set the prior scale of every column, and leave out joints of which too few rows tell.
 
     Args:
         lib: The candidates.
-        stretches: Rows with columns [regressor | amplitudes].
-        factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
+        stretches: One per recording.
         uncertainty: Stated relative standard deviation of the inertials.
     """
-    nuisances = len(factor)
+    nuisances = 10 * lib.robot.n
     tells = sum(s.use.sum(axis=0) for s in stretches) >= FEWEST_ROWS
-    out = []
-    for s in stretches:
-        theta = s.X[..., :nuisances] @ factor
-        X = np.concatenate([theta, s.X[..., nuisances:], theta], axis=-1)
-        out.append(dataclasses.replace(s, X=X, use=s.use & tells))
-    torque = np.sqrt(np.mean(np.concatenate([s.tau for s in out]) ** 2, axis=0))
-    rms = np.sqrt(np.mean(np.concatenate([s.X[..., nuisances : nuisances + lib.size] for s in out]) ** 2, axis=0))
+    out = [dataclasses.replace(s, use=s.use & tells) for s in stretches]
+    rows = sum(len(s.t) for s in out)
+    torque = np.sqrt(sum(np.sum(s.tau**2, axis=0) for s in out) / rows)
+    amplitudes = [s.X[..., nuisances:-nuisances] for s in out]
+    rms = np.sqrt(sum(np.einsum("tjk,tjk->jk", x, x) for x in amplitudes) / rows)
     with np.errstate(divide="ignore"):
         seen = rms > ROUNDING * torque[:, None]
         typical = np.min(np.where(seen, TYPICAL_SHARE * torque[:, None] / np.where(seen, rms, 1), np.inf), axis=0)

@@ -70,12 +70,10 @@ class Library:
             amplitudes.append(np.broadcast_to(amplitude, (S, G, m, width)).ravel())
         return np.concatenate(joints), np.concatenate(amplitudes)
 
-    def spread(self, entries: np.ndarray) -> np.ndarray:
-        """Columns by joint and amplitude, (T, n, size), from the non-zero ones, (T, entries)."""
+    def spread(self, entries: np.ndarray, out: np.ndarray) -> None:
+        """Write the non-zero columns, (T, entries), into zeros by joint and amplitude, (T, n, size)."""
         joints, amplitudes = self.entries
-        out = np.zeros((len(entries), self.robot.n, self.size))
         out[:, joints, amplitudes] = entries
-        return out
 
     def torque(self, entries: np.ndarray, columns: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Torque (T, n) of some amplitudes, from the non-zero columns (T, entries)."""

@@ -12,7 +12,6 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
-from irb140_jax.mismatch.along import scales_of
 from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior, withdrawn
 from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
@@ -109,16 +108,15 @@ def _diagnosed(
         proof = held_out(ex, refit)
         rest = unexplained(ex, proof)
     found = findings(robot, ex)
-    scales = scales_of(smooth, robot)
-    model = _model(robot, ex, refit, band, scales.rest_speed)
-    matters = reference(ex.lib, scales, band.rate)
+    model = _model(robot, ex, refit, band)
+    matters = reference(ex.lib, ex.scales, band.rate)
     seen = visibility(ex, matters)
     diagnosis = _document(robot, ex, proof, found, rest, recordings, seen)
-    open_ = undecided(ex, found, seen, matters, band, scales, config.inertial_uncertainty)
+    open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     return Result(diagnosis, model, _views(robot, ex, proof, model, recordings, smooth, diagnosis), open_)
 
 
-def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band, rest_speed: np.ndarray) -> CorrectedModel:
+def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band) -> CorrectedModel:
     loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
     refitted_shift, _, _ = fitted(ex.data, refit.posterior(), loose, ex.factor)
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
@@ -126,7 +124,7 @@ def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band, rest_speed: 
     phi = np.asarray(robot.phi)
     named = tuple(Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True))
     phi_refit, phi_corrected = (phi + shift.reshape(phi.shape) for shift in (refitted_shift, dphi))
-    return CorrectedModel(robot, phi_refit, phi_corrected, named, band, rest_speed)
+    return CorrectedModel(robot, phi_refit, phi_corrected, named, band, ex.scales.rest_speed)
 
 
 def _document(

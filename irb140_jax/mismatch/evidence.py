@@ -41,6 +41,12 @@ class Grams:
     rows: np.ndarray
     nuisances: int
 
+    def of(self, columns: np.ndarray) -> "Grams":
+        """The same of some columns and y alone."""
+        index = np.append(columns, self.blocks.shape[-1] - 1)
+        part = lambda H: H[:, index[:, None], index]  # noqa: E731
+        return dataclasses.replace(self, blocks=part(self.blocks), per_joint=part(self.per_joint))
+
     def total(self, without: np.ndarray | None = None) -> np.ndarray:
         """Sum over blocks, leaving some out."""
         return self.blocks.sum(axis=0) if without is None else self.blocks[~without].sum(axis=0)

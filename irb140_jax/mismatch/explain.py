@@ -7,7 +7,7 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by, stretch
-from irb140_jax.mismatch.assemble import Data, assemble, first_noise, problem
+from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble, first_noise, problem
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
 from irb140_jax.mismatch.model import Named, better_known, composed
@@ -29,6 +29,7 @@ class Explanation:
 
     Attributes:
         lib: The library in its last state: refined shapes.
+        scales: Sizes of the recordings.
         data: Low-passed rows.
         noise: Whitening under the explanation.
         problem: Search problem.
@@ -38,6 +39,7 @@ class Explanation:
     """
 
     lib: Library
+    scales: Scales
     data: Data
     noise: Noise
     problem: Problem
@@ -77,28 +79,34 @@ def explain(
     factor = inertial_prior_factor(robot, 1.0)
     progress("rigid body along the recordings")
     along = [prepared(robot, r) for r in recordings]
-    scales = scales_of(recordings, robot)
+    scales = scales_of(along)
     lib = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     loads: list[Loads | None] = [None] * len(recordings)
     chosen: tuple[int, ...] = ()
-    ex: Explanation | None = None
+    noise: Noise | None = None
     for turn in range(PASSES):
         progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn + 1})")
-        rows = [stretch(lib, r, i, band, load) for i, (r, load) in enumerate(zip(along, loads, strict=True))]
-        data = assemble(lib, rows, factor, uncertainty)
+        rows = [stretch(lib, r, i, band, factor, load) for i, (r, load) in enumerate(zip(along, loads, strict=True))]
+        data = assemble(lib, rows, uncertainty)
+        del rows  # here and below: what only the next round needs would stand in memory beside it
         progress(f"searching sets of explanations (round {turn + 1})")
-        ex = _settled(lib, data, factor, chosen, ex.noise if ex else None)
-        if turn < PASSES - 1:
-            post = full_posterior(data, ex.problem, ex.grams, ex.chosen)
-            better = _better_known(robot, fitted(data, post, ex.chosen, factor))
-            along = [seen_by(better, r) for r in along]
-            loads = [_loads(lib, data, post, ex.chosen, factor, r, i) for i, r in enumerate(along)]
-            lib, chosen = _refined(lib, ex, scales)
-    assert ex is not None, "PASSES is at least one"
-    return ex
+        last = turn == PASSES - 1
+        ex = _settled(lib, scales, data, factor, chosen, noise, blocks=BLOCKS if last else 1)
+        if last:
+            return ex
+        found = fitted(data, full_posterior(data, ex.problem, ex.grams, ex.chosen), ex.chosen, factor)
+        better = _better_known(robot, found)
+        along = [seen_by(better, r) for r in along]
+        loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
+        (lib, chosen), noise = _refined(ex), ex.noise
+        del data, ex
+    raise AssertionError("PASSES is at least one")
 
 
-def _settled(lib: Library, data: Data, factor: np.ndarray, chosen: tuple[int, ...], noise: Noise | None) -> Explanation:
+def _settled(
+    lib: Library, scales: Scales, data: Data, factor: np.ndarray, chosen: tuple[int, ...], noise: Noise | None,
+    blocks: int,
+) -> Explanation:  # fmt: skip
     """Search and noise in turn: noise that the last explanation left may hide an effect that it named wrongly."""
     rounds = 1 if noise else 2  # the noise of the round before is nearly right
     noise = noise or first_noise(data)
@@ -107,8 +115,8 @@ def _settled(lib: Library, data: Data, factor: np.ndarray, chosen: tuple[int, ..
         chosen = search(prob, chosen)
         noise = _noise_under(data, prob, g, chosen)
         del prob, g  # hundreds of megabytes, before the next are made
-    prob, g = problem(data, noise)
-    return Explanation(lib, data, noise, prob, g, search(prob, chosen), factor)
+    prob, g = problem(data, noise, blocks)
+    return Explanation(lib, scales, data, noise, prob, g, search(prob, chosen), factor)
 
 
 def withdrawn(ex: Explanation, names: Collection[int]) -> Explanation:
@@ -122,7 +130,8 @@ def withdrawn(ex: Explanation, names: Collection[int]) -> Explanation:
 def full_posterior(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without=None) -> Posterior:
     """Posterior of inertials and chosen amplitudes, in prior units."""
     columns = np.concatenate([np.arange(data.nuisances), prob.columns(chosen)])
-    return posterior(g.total(without), columns)
+    post = posterior(g.of(columns).total(without), np.arange(len(columns)))
+    return dataclasses.replace(post, columns=columns)
 
 
 def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -> Noise:
@@ -142,11 +151,9 @@ def _better_known(robot: Robot, found: tuple[np.ndarray, list[Candidate], list[n
     return better_known(robot, np.asarray(robot.phi) + dphi.reshape(-1, 10), named)
 
 
-def _loads(
-    lib: Library, data: Data, post: Posterior, chosen, factor: np.ndarray, r: Prepared, index: int
-) -> Loads:
-    """Loads of the explained model along a recording."""
-    dphi, members, amplitudes = fitted(data, post, chosen, factor)
+def _loads(lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]], r: Prepared, index: int) -> Loads:
+    """Loads of an explanation (see `fitted`) along a recording."""
+    dphi, members, amplitudes = found
     torques = composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi)
     return Loads(torques.load, torques.total, torques.carried)
 
@@ -169,20 +176,20 @@ def fitted(
     return dphi, members, amplitudes
 
 
-def _refined(lib: Library, ex: Explanation, scales: Scales) -> tuple[Library, tuple[int, ...]]:
+def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
     """Finer grids of shapes around the chosen ones, and grids that the residual suggests."""
     left = left_over(ex.data, ex.columns(), ex.noise.total)
     shapes = []
-    for effect, sites, old, _ in lib.blocks:
+    for effect, sites, old, _ in ex.lib.blocks:
         new = old.copy()
         for s, joints in enumerate(sites):
             mine = [m for m in ex.members if m.slug == effect.slug and m.joints == tuple(joints)]
             if mine and effect.refines():
                 new[s] = effect.finer(old[s], mine[0].shape)
             elif effect.scouts and not mine:
-                new[s] = suggested(effect, left, scales, joints, old[s])
+                new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)
-    refined = reshaped(lib, shapes)
+    refined = reshaped(ex.lib, shapes)
     return refined, tuple(_same(c, refined, ex.data) for c in ex.chosen)
 
 

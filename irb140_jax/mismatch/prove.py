@@ -10,7 +10,7 @@ from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.name import PREFER, possible_beside, simpler
 from irb140_jax.mismatch.noise import noise_from_residuals
 
-ALONE = 0.8  # share of a joint's usable rows from which a recording is the only one that says much of the joint
+ALONE = 0.8  # share of a joint's usable rows, or of a finding's torque, beside which the others say nothing of it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,16 +37,31 @@ class HeldOut:
         return np.sqrt(squares / np.maximum(sum(u.sum(axis=0) for u in self.use), 1))
 
 
-def folds(g: Grams) -> list[np.ndarray]:
+def folds(ex: Explanation) -> list[np.ndarray]:
     """Blocks to leave out together: a recording each, or contiguous blocks of the only one.
 
-    A recording that all but alone moves some joint is left out block by block, too: without it nothing is known there.
+    A recording that all but alone moves some joint, or all but alone holds what a finding does, is left out block by
+    block, too: without it nothing is known there, and a wall that is touched once would drown all else.
     """
-    out, every, rows = [], np.arange(len(g.recording)), np.maximum(g.rows.sum(axis=0), 1)
+    g = ex.grams
+    out, every, weight = [], np.arange(len(g.recording)), np.vstack([g.rows.T, _energy(ex, ex.chosen)])
+    weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
     for r in sorted(set(g.recording)):
         mine = g.recording == r
-        alone = np.max(g.rows[mine].sum(axis=0) / rows) > ALONE
+        alone = np.max(weight[:, mine].sum(axis=1)) > ALONE
         out += [every == b for b in np.flatnonzero(mine)] if alone else [mine]
+    return out
+
+
+def _energy(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:
+    """Squared whitened torque of each member of a set in each block, shape (members, blocks)."""
+    mean, at = full_posterior(ex.data, ex.problem, ex.grams, chosen).mean, ex.data.nuisances
+    out = np.zeros((len(chosen), len(ex.grams.recording)))
+    for k, c in enumerate(chosen):
+        columns = ex.problem.columns((c,))
+        w = mean[at : at + len(columns)]
+        at += len(columns)
+        out[k] = np.einsum("i,bij,j->b", w, ex.grams.blocks[:, columns[:, None], columns], w)
     return out
 
 
@@ -82,16 +97,14 @@ def refitted(ex: Explanation) -> Refit:
 
 def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     """Residuals of the rival models, each row predicted from the other recordings (or blocks)."""
-    data, once = ex.data, _happening_once(ex, ex.chosen)
+    data, energy = ex.data, _energy(ex, ex.chosen)
     seen = full_posterior(data, ex.problem, ex.grams, ex.chosen).mean
     out = {name: [s.y.copy() for s in data.stretches] for name in ("refit", "corrected")}
-    for fold in folds(ex.grams):
+    for fold in folds(ex):
+        unseen = full_posterior(data, ex.problem, ex.grams, ex.chosen, fold).mean
         fits = {
             "refit": (refit.columns, refit.posterior(fold).mean),
-            "corrected": (
-                ex.columns(),
-                np.where(once, seen, full_posterior(data, ex.problem, ex.grams, ex.chosen, fold).mean),
-            ),
+            "corrected": (ex.columns(), np.where(_only_here(ex, ex.chosen, energy, fold), seen, unseen)),
         }
         for r, s in enumerate(data.stretches):
             mine = fold[ex.grams.recording == s.recording]
@@ -107,21 +120,22 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
 
 def unseen_error(ex: Explanation, chosen: tuple[int, ...]) -> float:
     """Whitened squared error of a set on data that its fit did not see."""
-    H, error = ex.grams.blocks, 0.0
-    columns = ex.columns(chosen)
-    index = np.concatenate([columns, [H.shape[1] - 1]])
-    own = dataclasses.replace(ex.grams, blocks=H[:, index[:, None], index[None, :]])
-    every, once = np.arange(len(columns)), _happening_once(ex, chosen)
+    columns, error = ex.columns(chosen), 0.0
+    own = ex.grams.of(columns)
+    every, energy = np.arange(len(columns)), _energy(ex, chosen)
     seen = posterior(own.total(), every).mean
-    for fold in folds(ex.grams):
-        w = np.append(np.where(once, seen, posterior(own.total(fold), every).mean), -1.0)
+    for fold in folds(ex):
+        only = _only_here(ex, chosen, energy, fold)
+        w = np.append(np.where(only, seen, posterior(own.total(fold), every).mean), -1.0)
         error += float(w @ own.blocks[fold].sum(axis=0) @ w)
     return error
 
 
-def _happening_once(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:
-    """Which columns of a set belong to what happens once: no recording tells of another's, so all data may be used."""
-    parts = [np.full(len(c.columns), c.effect.once) for c in (ex.data.candidates[i] for i in chosen)]
+def _only_here(ex: Explanation, chosen: tuple[int, ...], energy: np.ndarray, fold: np.ndarray) -> np.ndarray:
+    """Which columns of a set belong to what happens once, or but for a trace in this fold: no other tells of them."""
+    members = [ex.data.candidates[i] for i in chosen]
+    alone = energy[:, fold].sum(axis=1) > ALONE * energy.sum(axis=1)
+    parts = [np.full(len(c.columns), c.effect.once or a) for c, a in zip(members, alone, strict=True)]
     return np.concatenate([np.zeros(ex.data.nuisances, dtype=bool), *parts])
 
 

@@ -45,8 +45,8 @@ class Questions:
         along = prepared(self._robot, played(motion, o.scales.rest_speed))
         if np.any(np.abs(along.nominal) > effort_share * np.asarray(self._robot.effort_limit)):
             return None
-        rows = stretch(self._lib, along, 0, o.band)
-        theta = rows.X[..., : len(self._factor)] @ self._factor
+        rows = stretch(self._lib, along, 0, o.band, self._factor)
+        theta = rows.X[..., : len(self._factor)]
         loose = [theta[..., 10 * k : 10 * k + 10] for k in o.loose]
         X = np.concatenate([theta, *loose, rows.X[..., len(self._factor) + self._order]], axis=-1)
         scale = np.concatenate(

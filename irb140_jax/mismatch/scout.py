@@ -27,7 +27,7 @@ def scouted(
     ordinary = [e for e in effects if e.ordinary]
     beside = [e for e in effects if any(e.slug in o.beside for o in effects)]
     plain = library(lib.robot, ordinary + beside, scales)
-    data = assemble(plain, [stretch(plain, r, i, band) for i, r in enumerate(along)], factor, uncertainty)
+    data = assemble(plain, [stretch(plain, r, i, band, factor) for i, r in enumerate(along)], uncertainty)
     columns = np.arange(data.nuisances + library(lib.robot, ordinary, scales).size)
     noise = np.array([[_rms(s.y[s.use[:, j], j]) for j in range(lib.robot.n)] for s in data.stretches])
     for _ in range(2):  # the first noise holds what friction explains
@@ -37,7 +37,7 @@ def scouted(
         noise = noise * np.array(size)
     left = left_over(data, columns, noise)
     free = np.arange(data.nuisances + plain.size)
-    best = _scanned(lib, along, band, scales, left_over(data, free, noise))
+    best = _scanned(lib, along, band, factor, scales, left_over(data, free, noise))
     shapes = [
         np.stack([
             e.around(best[e.slug, tuple(joints)]) if (e.slug, tuple(joints)) in best
@@ -49,13 +49,13 @@ def scouted(
 
 
 def _scanned(
-    lib: Library, along: Sequence[Prepared], band: Band, scales: Scales, left: LeftOver
+    lib: Library, along: Sequence[Prepared], band: Band, factor: np.ndarray, scales: Scales, left: LeftOver
 ) -> dict[tuple[str, tuple[int, ...]], np.ndarray]:
     """The best shape of each effect that has a scan, by effect and site."""
     scanning = [e for e, sites, *_ in lib.blocks if len(e.scan(scales, sites[0]))]
     many = library(lib.robot, scanning, scales, scan=True)
-    rows = [stretch(many, r, i, band) for i, r in enumerate(along)]
-    X = _thinned(rows, lambda s: s.X[..., 10 * lib.robot.n :])[::THIN]
+    rows = [stretch(many, r, i, band, factor) for i, r in enumerate(along)]
+    X = _thinned(rows, lambda s: s.X[..., len(factor) : -len(factor)])[::THIN]
     left = left.every(THIN)
     best: dict[tuple[str, tuple[int, ...]], tuple[float, np.ndarray]] = {}
     for group in layouts(many.candidates, 0):

@@ -146,8 +146,9 @@ def stands_out(
     simple = set(effect.contains)
     # A named law at the site that is or has the special case is eliminated already.
     there = any(m.joints == candidate.joints and simple & {m.effect.slug, *m.effect.contains} for m in members)
-    left, _ = eliminated(H, columns[:0] if there or not simple else np.delete(columns, own))
-    size = strength[own] @ left[np.ix_(columns[own], columns[own])] @ strength[own]
+    special = np.zeros(0, dtype=int) if there or not simple else np.delete(np.arange(len(columns)), own)
+    left, _ = eliminated(H[np.ix_(columns, columns)], special)
+    size = strength[own] @ left[np.ix_(own, own)] @ strength[own]
     return float(np.sqrt(max(size, 0.0)))
 
 

@@ -101,7 +101,7 @@ class Undecided:
 
 def undecided(
     ex: Explanation, findings: Sequence[dict[str, Any]], seen: dict[Site, tuple[float, int]], matters: Reference,
-    band: Band, scales: Scales, uncertainty: float,
+    band: Band, uncertainty: float,
 ) -> Undecided:  # fmt: skip
     """What is open after a diagnosis.
 
@@ -111,7 +111,6 @@ def undecided(
         seen: How well every other effect could be seen, from `visibility`.
         matters: Strengths at which that is judged, from `testable.reference`.
         band: Of the comparison.
-        scales: Sizes of the recordings.
         uncertainty: Relative standard deviation of the inertials.
     """
     names = ex.lib.robot.joint_names
@@ -141,7 +140,7 @@ def undecided(
     level = np.where(still, UNKNOWN_NOISE * matters.torque, np.median(ex.noise.level, axis=0))
     return Undecided(
         tuple(table.columns), chosen, links, made, hidden, gram, scale, strength, uncertainty, ex.noise.ar, level,
-        band, scales,
+        band, ex.scales,
     )  # fmt: skip
 
 

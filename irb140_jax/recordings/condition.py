@@ -6,6 +6,7 @@ from measurement and model alike.
 
 import dataclasses
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from scipy import interpolate, ndimage
@@ -91,10 +92,10 @@ def _coherent_limit(smooth: list["Conditioned"], robot: Robot, band: Band) -> fl
     f = np.fft.rfftfreq(window, 1.0 / band.rate)
     spectra = np.zeros((robot.n, len(f), 4, 4), dtype=complex)
     taper = np.hanning(window)[:, None]
-    phi = np.asarray(robot.phi).ravel()
+    passive = lambda r: (r.stiffness, r.damping, r.frictionloss)  # noqa: E731
+    moving = eqx.tree_at(passive, robot, (jnp.zeros(robot.n),) * 3)
     for r in smooth:
-        Y = np.asarray(dynamics.regressor_batch(robot, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
-        m = Y @ phi + np.asarray(robot.armature) * r.qdd
+        m = np.asarray(dynamics.inverse_dynamics_batch(moving, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
         direction = np.tanh(r.qd / r.rest_speed)
         friction = np.concatenate([direction, r.qd], axis=1)
         slow = filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), kernels(SLOW, band.rate)[0], odd=False)

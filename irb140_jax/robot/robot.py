@@ -1,6 +1,7 @@
 """The robot as a pytree: every number is a leaf, so everything can be fitted, batched and differentiated."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -108,12 +109,16 @@ class Robot(eqx.Module):
     @property
     def phi(self) -> Inertials:
         """Inertial parameters of each link about its frame, [m, m c, Ixx, Ixy, Ixz, Iyy, Iyz, Izz], shape (n, 10)."""
-        first = self.mass[:, None] * self.com
-        c2 = jnp.sum(self.com**2, axis=-1)[:, None, None]
-        outer = self.com[:, :, None] * self.com[:, None, :]
-        about_origin = self.inertia + self.mass[:, None, None] * (c2 * jnp.eye(3) - outer)
-        rows, cols = jnp.triu_indices(3)
-        return jnp.concatenate([self.mass[:, None], first, about_origin[:, rows, cols]], axis=1)
+        return _phi(self.mass, self.com, self.inertia)
+
+
+@jax.jit  # a dozen operations that would each be compiled by itself
+def _phi(mass: Array, com: Array, inertia: Array) -> Inertials:
+    c2 = jnp.sum(com**2, axis=-1)[:, None, None]
+    outer = com[:, :, None] * com[:, None, :]
+    about_origin = inertia + mass[:, None, None] * (c2 * jnp.eye(3) - outer)
+    rows, cols = jnp.triu_indices(3)
+    return jnp.concatenate([mass[:, None], mass[:, None] * com, about_origin[:, rows, cols]], axis=1)
 
 
 def with_phi(robot: Robot, phi: Inertials) -> Robot:

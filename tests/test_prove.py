@@ -1,0 +1,64 @@
+"""What counts as proof on unseen data, where some of the data are the only ones to tell of something."""
+
+import numpy as np
+import pytest
+from helpers_recordings import recording, robot
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.effects.left_over import LeftOver
+from irb140_jax.mismatch.explain import Explanation, explain
+from irb140_jax.mismatch.prove import folds, held_out, refitted
+from irb140_jax.recordings.condition import choose_band, condition
+
+FRICTION = tuple(CATALOGUE[slug] for slug in ("coulomb_friction", "viscous_friction"))
+
+
+def explained(*sizes: float) -> Explanation:
+    """Of recordings in which the joints move by so much."""
+    logs, arm = [recording(seed=4 + k, size=size, noise=0.2) for k, size in enumerate(sizes)], robot()
+    band = choose_band(logs, arm)
+    return explain(arm, [condition(log, band) for log in logs], band, FRICTION, 0.05)
+
+
+@pytest.fixture(scope="module")
+def alike() -> Explanation:
+    return explained(0.9, 0.9, 0.9)
+
+
+@pytest.fixture(scope="module")
+def one_alone() -> Explanation:
+    """The second and third hardly move, and so hardly tell of viscous friction."""
+    return explained(0.9, 0.05, 0.05)
+
+
+def test_recordings_that_tell_alike_are_left_out_whole(alike):
+    assert [fold.sum() for fold in folds(alike)] == [5, 5, 5]
+
+
+def test_a_recording_that_alone_holds_a_finding_is_left_out_block_by_block(one_alone):
+    assert [fold.sum() for fold in folds(one_alone)] == [1, 1, 1, 1, 1, 5, 5]
+
+
+def test_what_one_recording_alone_holds_is_proved_within_it(one_alone):
+    viscous = [c.joints[0] for c in one_alone.members if c.slug == "viscous_friction"]
+    assert viscous
+    proof = held_out(one_alone, refitted(one_alone))
+    # As good as on data that the fit saw; left out whole, the friction would be a guess from the slow recordings.
+    np.testing.assert_array_less(proof.rmse(proof.corrected)[viscous], 1.1 * proof.floor[viscous])
+
+
+def test_sums_over_windows_gain_what_the_windows_themselves_gain():
+    rng = np.random.default_rng(0)
+    rows, n, known = 200, 3, 20
+    left = LeftOver(
+        np.repeat([0, 1], rows // 2), np.tile(np.arange(rows // 2) * 0.1, 2), rng.normal(size=(rows, n)),
+        rng.normal(size=(rows, 3)), rng.normal(size=(rows, n, 3)), rng.uniform(1.0, 2.0, (rows, n)),
+        rng.normal(size=(rows, n)), rng.normal(size=(rows, n, known)),
+    )  # fmt: skip
+    mine, columns = left.recording == 1, rng.normal(size=(rows // 2, n, 3))
+    first, last = np.array([0, 10, 50]), np.array([30, 90, 100])
+    inside = (np.arange(rows // 2) >= first[:, None]) & (np.arange(rows // 2) < last[:, None])
+    windows = np.where(inside[..., None, None], columns, 0.0)
+    np.testing.assert_allclose(
+        left.gains_within(columns, first, last, mine), left.gains(windows, mine)[0], rtol=1e-9
+    )
