@@ -50,7 +50,8 @@ def page(results: dict) -> str:
     return (
         "# Benchmarks\n\n"
         "Written by `python benchmarks/run.py` (needs the extra `bench`); don't edit.\n\n"
-        f"IRB 140, float64, default XLA options, pinned to one core; processor time, median of {results['rounds']} "
+        f"IRB 140, float64, pinned to one core; XLA's default options, and `compiler.QUICK` for `rollouts` and "
+        f"`runge_kutta`, ours and the peers'; processor time, median of {results['rounds']} "
         "rounds in which ours and the peer's run in turn; compile time is that of the first call less the second's. "
         "`1e3`, `1e5`: samples a call. `per_s`: samples a second. `paper_style`: M, Christoffel C and g, against C by "
         "`jacfwd` of M. `identification`: 60 000 samples of six joints, Gram matrix and solution, against Pinocchio's "

@@ -14,6 +14,7 @@ import mujoco.rollout
 import numpy as np
 
 from irb140_jax import control, dynamics, simulate
+from irb140_jax.compiler import QUICK
 from irb140_jax.dynamics.chain import plan
 from irb140_jax.dynamics.scalar_arm import acceleration, scalar_arm
 from irb140_jax.oracle.mjcf import mjcf
@@ -59,7 +60,7 @@ def closed_loop(arm: Robot, integrator: simulate.AbstractIntegrator, steps: int)
         run = simulate.rollout(arm, control.sliding_mode(with_phi(arm, phi)), motion, integrator=integrator)
         return run.q, run.qd  # what MuJoCo's rollout returns
 
-    return jax.jit(jax.vmap(one))
+    return jax.jit(jax.vmap(one), compiler_options=QUICK)
 
 
 def rollouts(robot: Robot) -> dict[str, float]:
@@ -151,4 +152,4 @@ def solved_by_diffrax(diffrax, arm: Robot, field, steps: int):
             adjoint=diffrax.ForwardMode(),
         ).ys[0][-1]  # fmt: skip
 
-    return eqx.filter_jit(jax.vmap(one))
+    return eqx.filter_jit(jax.vmap(one), compiler_options=QUICK)  # pyright: ignore[reportCallIssue]: goes to jax.jit

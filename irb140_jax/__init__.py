@@ -1,7 +1,6 @@
 """Differentiable dynamics of serial arms, and a diagnosis of the physics a model left out."""
 
 import importlib
-import importlib.metadata
 import os
 import sys
 from typing import TYPE_CHECKING
@@ -12,12 +11,6 @@ if "jax" in sys.modules:
     sys.modules["jax"].config.update("jax_enable_x64", True)
 else:
     os.environ["JAX_ENABLE_X64"] = "1"
-
-# Halves the time XLA takes to compile programs of scalars; see docs/decisions/11-xla-without-fusion-emitters.md.
-_FUSION = "--xla_cpu_use_fusion_emitters"
-# XLA ends the process at flags that it does not know, so only those versions get it that are known to.
-if importlib.metadata.version("jaxlib").startswith("0.10.") and _FUSION not in os.environ.get("XLA_FLAGS", ""):
-    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {_FUSION}=false".strip()
 
 if TYPE_CHECKING:
     from irb140_jax import control as control

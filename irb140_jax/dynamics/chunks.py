@@ -11,6 +11,8 @@ from jax import lax
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from irb140_jax.compiler import QUICK
+
 # Samples at a time: the intermediate results of so many stay in the second-level cache.
 CHUNK = 1000
 # Longest piece handed to XLA at once; two sizes, CHUNK and SEGMENT, are all that is ever compiled.
@@ -87,7 +89,7 @@ def _padded(x: np.ndarray, used: int, room: int) -> np.ndarray:
     return result
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK)
 def _loop(kernel: Kernel, given: Any, arrays: list[Array], chunks: Array) -> Array:
     """The first `chunks` chunks of the result; their number is not part of the program."""
     shape = jax.eval_shape(lambda: kernel(given, *_chunk(arrays, 0)))
@@ -99,7 +101,7 @@ def _loop(kernel: Kernel, given: Any, arrays: list[Array], chunks: Array) -> Arr
     return lax.fori_loop(0, chunks, step, result)
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK)
 def _sum_loop(kernel: Kernel, given: Any, arrays: list[Array], chunks: Array) -> Array:
     """Sum over the first `chunks` chunks; their number is not part of the program."""
     shape = jax.eval_shape(lambda: kernel(given, *_chunk(arrays, 0)))

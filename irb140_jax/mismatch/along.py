@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from irb140_jax import dynamics, kinematics
+from irb140_jax.compiler import QUICK
 from irb140_jax.dynamics.chunks import in_chunks
 from irb140_jax.effects import Motion, RigidBody, Scales
 from irb140_jax.effects.gravity_tilt import across
@@ -177,7 +178,7 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
 
 
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
-@eqx.filter_jit
+@eqx.filter_jit(compiler_options=QUICK)  # pyright: ignore[reportCallIssue]: passed on to jax.jit, says its docstring
 def _columns(effects, motion, sites, shapes):
     T = len(motion.t)
     rows = [jnp.zeros((T, 0))]
