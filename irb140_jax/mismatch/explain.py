@@ -84,23 +84,23 @@ def explain(
     loads: list[Loads | None] = [None] * len(recordings)
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
-    for turn in range(PASSES):
-        progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn + 1})")
+
+    def explained(turn: int, blocks: int) -> Explanation:
+        progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
         rows = [stretch(lib, r, i, band, factor, load) for i, (r, load) in enumerate(zip(along, loads, strict=True))]
         data = assemble(lib, rows, uncertainty)
-        del rows  # here and below: what only the next round needs would stand in memory beside it
-        progress(f"searching sets of explanations (round {turn + 1})")
-        last = turn == PASSES - 1
-        ex = _settled(lib, scales, data, factor, chosen, noise, blocks=BLOCKS if last else 1)
-        if last:
-            return ex
-        found = fitted(data, full_posterior(data, ex.problem, ex.grams, ex.chosen), ex.chosen, factor)
+        progress(f"searching sets of explanations (round {turn})")
+        return _settled(lib, scales, data, factor, chosen, noise, blocks)
+
+    for turn in range(1, PASSES):
+        ex = explained(turn, blocks=1)
+        found = fitted(ex.data, full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), ex.chosen, factor)
         better = _better_known(robot, found)
         along = [seen_by(better, r) for r in along]
         loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
         (lib, chosen), noise = _refined(ex), ex.noise
-        del data, ex
-    raise AssertionError("PASSES is at least one")
+        del ex  # hundreds of megabytes, before the next
+    return explained(PASSES, BLOCKS)
 
 
 def _settled(

@@ -172,8 +172,10 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
         rival = CATALOGUE[key[0]]
         excess, guard = value - own, rival.feigned**2 * explained[rival.friction]
         if c.slug in rival.contains:
-            # A law that contains the named one was not needed; even odds where the search would have taken it.
-            odds[key] = own + (PREFER * (excess / (guard + PREFER) - 1.0) if excess > 0 else excess - PREFER)
+            # A law that contains the named one was not needed; even odds where the search would have taken it.  Below,
+            # as much of its handicap counts as imperfect laws have a part in the hurdle: on clean data, the evidence.
+            hurdle = guard + PREFER
+            odds[key] = own + min(excess, 0.0) - PREFER * guard / hurdle * (1.0 - max(excess, 0.0) / hurdle)
         elif abs(excess) <= guard:
             odds[key] = own  # within what an imperfect law could feign, a rival is as good as the named law
     for key, value in _pairs(ex, rest, c).items():

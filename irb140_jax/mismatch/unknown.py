@@ -248,6 +248,11 @@ def _p_value(rivals: list[Competitor], rows: Rows, share: float) -> float:
     return float((1 + np.sum(null >= share)) / (1 + SHIFTS))
 
 
+def _centred(y: np.ndarray, constant: np.ndarray) -> np.ndarray:
+    """Without its part along a constant torque: any structure may have a mean, and no competitor is asked for it."""
+    return y - constant * (constant @ y) / (constant @ constant)
+
+
 def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: float) -> tuple[int, ...]:
     """Findings that only stand in for the structure: its own variables predict as well without them.
 
@@ -265,7 +270,7 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
             torques[index] = rows.of([x[:, j] for x in torque])
     out, y = [], rows.residual
     for index in sorted(torques, key=lambda i: float(np.sum(torques[i] ** 2))):
-        without = y + torques[index] / rows.level
+        without = _centred(y + torques[index] / rows.level, 1.0 / rows.level)
         ratio = size / np.sqrt(np.mean(torques[index] ** 2))
         error = _missed(carrier, without[:, None])[0] / _missed(carrier, y[:, None])[0]
         if error < BETTER or (ratio > BELITTLED and error < 1.0 + NO_WORSE * min(ratio, 1.0)):
