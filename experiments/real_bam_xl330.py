@@ -4,9 +4,8 @@
 
 Fitted on the runs with gains 100, 200 and 800, judged on those with gain 400, as published.  Torque alone decides what
 is named.  The numbers are then refitted to the positions, in the closed loop in which they are judged: least squares on
-torque is drawn towards whatever a friction law does not follow, such as sticking.  A swing that falls to the wrong side
-of an unstable posture once can outweigh all else in positions; so the law that was named is refitted freely, and again
-within what the torque says of its numbers.
+torque is drawn towards whatever a friction law does not follow, such as sticking.  Positions in turn can prefer numbers
+that contradict the torque; so the law that was named is refitted freely, and again within what the torque says of it.
 """
 
 import dataclasses

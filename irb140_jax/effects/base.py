@@ -114,6 +114,7 @@ class AbstractEffect(abc.ABC):
         needs: The motion that would show the effect.
         feigned: Share of a joint's friction torque that other, imperfect laws may put into this effect's columns; less
             is no evidence for it.
+        formless: It has no law whose form could err, so that nothing is feigned by it.
         ordinary: Nearly every machine has it: rarer laws must beat it clearly.
         friction: It rubs inside the transmission, so it is no part of the load that the transmission carries.
         dissipative: It can only take energy out of the arm, at every instant.
@@ -144,6 +145,7 @@ class AbstractEffect(abc.ABC):
     confused_with: ClassVar[dict[str, str]] = {}
     needs: ClassVar[str]
     feigned: ClassVar[float] = 0.03
+    formless: ClassVar[bool] = False
     ordinary: ClassVar[bool] = False
     friction: ClassVar[bool] = False
     dissipative: ClassVar[bool] = False

@@ -139,12 +139,16 @@ class Problem:
         return gain_of(H, np.arange(len(columns))) + float(sum(self.log_prior[c] for c in chosen))
 
     def explained(self, chosen: tuple[int, ...], *, friction: bool = False) -> np.ndarray:
-        """Half the whitened squared torque that a set, or the friction in it, explains at each joint, shape (n,)."""
+        """Half the whitened squared torque that a set, or the friction in it, explains at each joint, shape (n,).
+
+        What has no form that could err does not count.
+        """
         index = self.columns(chosen)
         if len(index) == 0:
             return np.zeros(len(self.per_joint))
         members = [self.candidates[c] for c in chosen]
-        counts = np.concatenate([np.full(len(m.columns), m.effect.friction or not friction) for m in members])
+        counted = [not m.effect.formless and (m.effect.friction or not friction) for m in members]
+        counts = np.concatenate([np.full(len(m.columns), c) for m, c in zip(members, counted, strict=True)])
         v = np.where(counts, posterior(self.H, index).mean, 0.0)
         explained = np.einsum("i,jik,k->j", v, self.per_joint[:, index[:, None], index[None, :]], v)
         return 0.5 * explained
