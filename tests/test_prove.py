@@ -28,7 +28,7 @@ def alike() -> Explanation:
 @pytest.fixture(scope="module")
 def one_alone() -> Explanation:
     """The second and third hardly move, and so hardly tell of viscous friction."""
-    return explained(0.9, 0.05, 0.05)
+    return explained(0.9, 0.02, 0.02)
 
 
 def test_recordings_that_tell_alike_are_left_out_whole(alike):
@@ -43,8 +43,8 @@ def test_what_one_recording_alone_holds_is_proved_within_it(one_alone):
     viscous = [c.joints[0] for c in one_alone.members if c.slug == "viscous_friction"]
     assert viscous
     proof = held_out(one_alone, refitted(one_alone))
-    # As good as on data that the fit saw; left out whole, the friction would be a guess from the slow recordings.
-    np.testing.assert_array_less(proof.rmse(proof.corrected)[viscous], 1.1 * proof.floor[viscous])
+    # As good as on data that the fit saw; with that recording left out whole, the friction is a guess: 1.4 times it.
+    assert np.all(proof.rmse(proof.corrected)[viscous] < 1.1 * proof.floor[viscous])
 
 
 def test_sums_over_windows_gain_what_the_windows_themselves_gain():
