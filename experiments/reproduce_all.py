@@ -1,6 +1,6 @@
 """The whole study: every table and figure, published beside ours, and a page that says what holds.
 
-    python experiments/reproduce_all.py                               # the study's arm; an hour on one core
+    python experiments/reproduce_all.py                               # the study's arm; half an hour on one core
     python experiments/reproduce_all.py --robot arm.xml [--joints n]  # the same tables for any other arm
     python experiments/reproduce_all.py --smoke                       # all steps as small as can be, in a new folder
 
