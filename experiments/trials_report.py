@@ -129,10 +129,17 @@ def _median(values: Iterable[float]) -> str:
 
 
 def _errors(cases: list[dict]) -> list[tuple[float, bool, float]]:
-    """Relative error, whether the 90 % interval covers, and strength, of the parameters of rightly named effects."""
+    """Relative error, whether the 90 % interval covers, and strength, of the parameters of rightly named effects.
+
+    Where a special case of the effect is hidden at the same joint, the finding is the sum of both, and is left out.
+    """
     rows = []
     for case in cases:
         for e in case["truth"]:
+            slug, joints = _key(e)
+            special = CATALOGUE[slug].contains if slug in CATALOGUE else ()
+            if any((s, joints) in truths(case) for s in special):
+                continue
             for f in case["found"]:
                 if _key(e) != _key(f):
                     continue

@@ -146,7 +146,7 @@ LAWS_OF_MOTION = {
         [np.interp(m.t + 0.5 * p["delay"], m.t, x) for x in np.asarray(m.total_rate).T], axis=1),
     "gravity_spring": lambda p, m, j: p["stiffness"] * (AT(m.q, j) - p["rest"]),
     "gravity_tilt": lambda p, m, j: p["tilt"] * float(m.rigid.gravity) * (m.rigid.by_gravity @ m.rigid.across[0]),
-    "payload": lambda p, m, j: p["mass"] * np.asarray(m.rigid.last_link)[:, :, 0],
+    "payload": lambda p, m, j: p["mass"] * np.asarray(m.rigid.held)[:, :, 0],
     "encoder_offset": lambda p, m, j: -p["offset"] * np.asarray(m.rigid.by_q)[:, :, j],
     "joint_elasticity": lambda p, m, j: moved(m, j, swing(p, m, j)),
     "backlash": lambda p, m, j: moved(m, j, flight(p, m, j)),

@@ -13,7 +13,6 @@ from irb140_jax.mismatch.along import Stretch
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.evidence import eliminated, gain_of, gains, grams, layouts, posterior
 from irb140_jax.mismatch.noise import ORDER, Noise, noise_from_residuals
-from irb140_jax.mismatch.problem import Problem
 
 LAGS = 3  # coefficients of the whitening filter here, the row's own among them
 JOINTS, NUISANCES, AMPLITUDES = 2, 4, 5
@@ -260,19 +259,3 @@ def test_noise_of_few_rows_between_many_gaps_is_of_the_size_of_the_residual():
         noise = noise_from_residuals([x], [use], np.zeros(1))
         size = np.sqrt(np.mean(x[use] ** 2))
         assert 0.5 * size < noise.level[0, 0] < 10.0 * size
-
-
-def test_a_constant_has_no_form_that_could_feign_anything():
-    rng = np.random.default_rng(0)
-    X = np.stack([np.ones(80), np.sign(rng.normal(size=80))], axis=1)
-    y = X @ [3.0, 2.0] + rng.normal(size=80)
-    H = np.column_stack([X, y]).T @ np.column_stack([X, y])
-    limit, none = np.full((2, 1), np.inf), np.zeros(2)
-    pair = tuple(
-        Candidate(CATALOGUE[slug], (0,), np.zeros(0), np.array([k]), (0,), -limit[k], limit[k])
-        for k, slug in enumerate(("torque_offset", "coulomb_friction"))
-    )
-    problem = Problem(H, H[None], np.array([y @ y]), pair, 0, none, none, -limit, limit, np.zeros((2, 1)), -limit[:, 0])
-    w = np.linalg.solve(X.T @ X + np.eye(2), X.T @ y)
-    assert problem.explained((0,))[0] == 0.0
-    np.testing.assert_allclose(problem.explained((0, 1))[0], 0.5 * w[1] ** 2 * 80, rtol=1e-9)

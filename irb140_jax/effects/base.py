@@ -26,7 +26,7 @@ class RigidBody(eqx.Module):
         by_gravity: Torque per unit of each component of gravity in base axes [N m s^2/m], shape (T, n, 3).
         gravity: Size of gravity [m/s^2], shape ().
         across: Two unit vectors across gravity in base axes, shape (2, 3).
-        last_link: Torque per inertial parameter of the last link, shape (T, n, 10).
+        held: Torque per inertial parameter of a body held by the last link, about the tool, shape (T, n, 10).
         by_q, by_qd: Derivatives of the torque by joint positions and velocities, shape (T, n, n), torque first.
         spring: Stiffness of the model's own springs, shape (n,).
         mass: Joint-space mass matrix, links only, shape (T, n, n).
@@ -37,7 +37,7 @@ class RigidBody(eqx.Module):
     by_gravity: Float[Array, "T n 3"]
     gravity: Float[Array, ""]
     across: Float[Array, "2 3"]
-    last_link: Float[Array, "T n 10"]
+    held: Float[Array, "T n 10"]
     by_q: Float[Array, "T n n"]
     by_qd: Float[Array, "T n n"]
     spring: Joints
@@ -129,6 +129,7 @@ class AbstractEffect(abc.ABC):
         beside: Effects that are left free in a scan: without them it would find the shape that stands in for them.
         scanned: From how many shapes a scout picks the best: what chance has as many tries at.
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
+        tied: Its amplitudes are of one order of size: what the data can't see of one, the others bound.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
         steps: Whether it can be simulated forward in time all the same (see `memory` and `step`).
@@ -160,6 +161,7 @@ class AbstractEffect(abc.ABC):
     beside: ClassVar[tuple[str, ...]] = ()
     scanned: ClassVar[int] = 1
     adds_up: ClassVar[bool] = False
+    tied: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)
     history: ClassVar[str | None] = None
     steps: ClassVar[bool] = False
@@ -205,6 +207,19 @@ class AbstractEffect(abc.ABC):
         """
         del left, scales, joints
         return None
+
+    def alike(self, left: LeftOver, w: np.ndarray, shape: np.ndarray) -> np.ndarray:
+        """Physical parameters of others of its kind that no such recordings could tell from it, shape (any, p).
+
+        As far off either way as one standard deviation of what is known of them without the recordings.
+
+        Args:
+            left: What is left at every joint, time and recording.
+            w: Amplitudes of all columns.
+            shape: Shape parameters.
+        """
+        del left, w, shape
+        return np.zeros((0, len(self.parameters)))
 
     @abc.abstractmethod
     def columns(self, motion: Motion, joints: Int[Array, " m"], shape: Float[Array, " s"]) -> Float[Array, "T m k"]:

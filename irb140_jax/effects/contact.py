@@ -1,5 +1,7 @@
 """Contact: the tool leans on something springy in its surroundings."""
 
+import itertools
+
 import jax.numpy as jnp
 import numpy as np
 from scipy import optimize
@@ -12,6 +14,8 @@ DEEPEST = 0.5  # share of the samples behind the wall; beyond it this is no cont
 THIN = 3  # every third row: depths change slowly
 STARTS = 3  # walls from which the first scan is refined
 TILT, SHIFT = 0.02, 0.005  # first steps of the grid around the best wall: [rad] and share of the tool's travel
+FLAT = 1e-3  # of the tool's travel: directions in which it moves less than that are not felt
+TURNED = np.pi / 4  # [rad] by which a wall may be turned towards directions that are not felt
 
 
 class Contact(AbstractEffect):
@@ -44,37 +48,51 @@ class Contact(AbstractEffect):
         return np.arange(robot.n)[None, :]
 
     def shapes(self, scales, joints):
-        return self._around(np.array([0.0, 0.0, 1.0, 0.0]), TILT, SHIFT)
+        return self._around(np.array([0.0, 0.0, 1.0, 0.0]), np.eye(3)[:2], TILT, SHIFT)
 
     def refines(self):
         return True
 
     def finer(self, grid, best):
         step = 0.5 * np.max(np.abs(grid - best), axis=0)
-        return self._around(best, max(float(step[:3].max()), 1e-4), max(float(step[3]), 1e-6))
+        axes = [(b - a)[:3] for a, b in (grid[1:3], grid[3:5])]
+        axes = np.array([a / max(float(np.linalg.norm(a)), 1e-12) for a in axes])
+        return self._around(best, axes, max(float(step[:3].max()), 1e-4), max(float(step[3]), 1e-6))
 
     @staticmethod
-    def _around(best, tilt, shift):
-        """The wall, tilted both ways about two axes, and moved in and out, shape (7, 4)."""
-        across = np.linalg.svd(best[None, :3])[2][1:]
-        normals = [best[:3] + tilt * s * a for a in across for s in (-1.0, 1.0)]
+    def _around(best, axes, tilt, shift):
+        """The wall, tilted both ways towards each of two axes, and moved in and out, shape (7, 4)."""
+        normals = [best[:3] + tilt * s * a for a in axes for s in (-1.0, 1.0)]
         tilted = [np.append(n / np.linalg.norm(n), best[3]) for n in normals]
         return np.array([best, *tilted, best + [0, 0, 0, shift], best - [0, 0, 0, shift]])
 
     def scout(self, left, scales, joints):
         left = left.every(THIN)
+        felt, _ = _felt(left.tool)
         travel = float(np.ptp(left.tool, axis=0).max())
         if travel < 1e-6:
             return None
-        walls = np.array([
-            np.append(n, np.quantile(left.tool @ n, share)) for n in _sphere(NORMALS) for share in SHARES
-        ])  # fmt: skip
+        # Of all walls that feel alike, those across the tool's own directions.
+        normals = _sphere(NORMALS) @ felt.T @ felt
+        size = np.linalg.norm(normals, axis=1)
+        normals = normals[size > 0.1] / size[size > 0.1, None]
+        walls = np.array([np.append(n, np.quantile(left.tool @ n, share)) for n in normals for share in SHARES])
         gains = np.concatenate([_gain(left, part) for part in np.array_split(walls, NORMALS)])
         if gains.max() < np.log(self.scanned):
             return None  # no better than the best of so many is by chance
-        found = [_climbed(left, walls[i], travel) for i in _apart(walls[:, :3], gains)]
+        found = [_climbed(left, walls[i], felt, travel) for i in _apart(walls[:, :3], gains)]
         best = found[int(np.argmax([_gain(left, wall[None])[0] for wall in found]))]
-        return self._around(best, TILT, SHIFT * travel)
+        return self._around(best, _across(best[:3], felt), TILT, SHIFT * travel)
+
+    def alike(self, left, w, shape):
+        felt, middle = _felt(left.tool)
+        unfelt = np.linalg.svd(felt)[2][len(felt) :]
+        out = []
+        for a, turn in itertools.product(unfelt, (-TURNED, TURNED)):
+            normal = np.cos(turn) * shape[:3] + np.sin(turn) * a
+            position = np.cos(turn) * shape[3] + np.sin(turn) * a @ middle
+            out.append([float(w[0]) / np.cos(turn) ** 2, *normal, position])
+        return np.array(out).reshape(-1, len(self.parameters))
 
     def columns(self, motion, joints, shape):
         return _wall(motion.rigid.tool, motion.rigid.tool_jacobian, shape, jnp)[..., None]
@@ -122,9 +140,22 @@ def _apart(normals, gains):
     return chosen or [0]
 
 
-def _climbed(left, wall, travel):
-    """A short simplex search from a wall, over two turns about the middle of the tool's path and a shift."""
-    across, middle = np.linalg.svd(wall[None, :3])[2][1:], left.tool.mean(axis=0)
+def _felt(tool):
+    """Unit vectors along which the tool moves, shape (1 to 3, 3), and the middle of its path."""
+    middle = tool.mean(axis=0)
+    _, size, axes = np.linalg.svd(tool - middle, full_matrices=False)
+    return axes[size > FLAT * max(size[0], 1e-300)], middle
+
+
+def _across(normal, felt):
+    """Two unit vectors across a normal among the directions that are felt, zero where there are fewer, shape (2, 3)."""
+    _, size, axes = np.linalg.svd(felt - np.outer(felt @ normal, normal))
+    return np.vstack([axes[: np.sum(size > 0.5)], np.zeros((2, 3))])[:2]
+
+
+def _climbed(left, wall, felt, travel):
+    """A short simplex search from a wall, over turns about the middle of the tool's path and a shift."""
+    across, middle = _across(wall[:3], felt), left.tool.mean(axis=0)
 
     def turned(x):
         n = wall[:3] + x[:2] @ across

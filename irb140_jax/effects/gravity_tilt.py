@@ -24,6 +24,7 @@ class GravityTilt(AbstractEffect):
         "encoder_offset": "a sweep of the first joint",
     }
     needs = "postures whose gravity torques don't all scale together, with the first joint swept"
+    formless = True
     leans_on_inertials = True
     everywhere = True
     mjcf = "the gravity of the option element"

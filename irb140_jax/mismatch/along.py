@@ -19,7 +19,7 @@ from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.mismatch.candidates import Library
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
-from irb140_jax.robot import Robot
+from irb140_jax.robot import Robot, about_origin
 from irb140_jax.types import JointSamples
 
 RUN_IN = 128  # samples in which effects with memory forget how their chunk began
@@ -117,7 +117,8 @@ def _sensitivities(robot: Robot, recording: Conditioned, last_link: np.ndarray) 
     size = np.linalg.norm(np.asarray(robot.gravity))
     tool, tool_jacobian = _tool(robot, q)
     sides, springs = np.asarray(across(robot.gravity)), np.asarray(robot.stiffness)
-    arrays = (_by_gravity(bare, q), size, sides, last_link, by_q, by_qd, springs, mass, tool, tool_jacobian)
+    held = last_link @ np.asarray(about_origin(robot.tool_position))
+    arrays = (_by_gravity(bare, q), size, sides, held, by_q, by_qd, springs, mass, tool, tool_jacobian)
     return RigidBody(*arrays)  # pyright: ignore[reportArgumentType]: NumPy until it is compiled
 
 

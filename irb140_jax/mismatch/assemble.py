@@ -79,6 +79,10 @@ def assemble(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data
         seen = rms > ROUNDING * torque[:, None]
         typical = np.min(np.where(seen, TYPICAL_SHARE * torque[:, None] / np.where(seen, rms, 1), np.inf), axis=0)
     typical[~np.isfinite(typical)] = 0.0
+    for c in lib.candidates:
+        if c.effect.tied:
+            moves = typical[c.columns] > 0.0
+            typical[c.columns] = np.min(typical[c.columns], where=moves, initial=np.inf) if moves.any() else 0.0
     scale = np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
     loose = LooseInertials()
     extra = [
@@ -121,11 +125,11 @@ def problem(data: Data, noise: Noise, blocks: int = BLOCKS) -> tuple[Problem, Gr
         highest[i, : len(c.columns)] = c.highest / np.where(s > 0, s, 1.0)
         if c.effect.adds_up:
             summed[i, : len(c.columns)], least[i] = s, c.lowest[0]
-    energy = np.full(g.rows.shape[1], 1e-300)
+    energy = np.full((len(data.stretches), g.rows.shape[1]), 1e-300)
     for r, s in enumerate(data.stretches):
-        for j in range(len(energy)):
+        for j in range(energy.shape[1]):
             white = noise.whitened(s.tau[:, j], j, r)
-            energy[j] += np.sum(white[noise.usable(s.use[:, j], j)] ** 2)
+            energy[r, j] += np.sum(white[noise.usable(s.use[:, j], j)] ** 2)
     offset = data.nuisances
     entry = rare - log_prior
     return Problem(H, g.per_joint, energy, data.candidates, offset, log_prior, entry, lowest, highest, summed, least), g

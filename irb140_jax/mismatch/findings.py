@@ -12,6 +12,7 @@ from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.name import PREFER
 from irb140_jax.mismatch.problem import group_odds
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
+from irb140_jax.mismatch.scout import left_over
 from irb140_jax.robot import Robot
 
 NEIGHBOURS = 12  # shapes around the named one that tell how finely its grid resolves each parameter
@@ -61,6 +62,9 @@ def _parameters(
     variance = np.einsum("pk,kl,pl->p", slope, cov, slope) + _variance_over_shapes(ex, index, value, widen)
     if c.effect.leans_on_inertials:
         variance = variance + (value * _inertial_doubt(ex, c)) ** 2
+    if c.effect.scouts:
+        alike = c.effect.alike(left_over(ex.data, np.zeros(0, dtype=int), ex.noise.total), w, c.shape)
+        variance = variance + np.sum((alike - value) ** 2, axis=0) / 2.0
     slide = robot.is_slide[c.joints[0]]
     return {
         parameter.name: {
@@ -162,15 +166,16 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
         for key, value in group_odds(ex.problem, rest).items()
         if set(key[1]) & set(c.joints) and key[0] != "inertials" and key not in taken
     }
-    explained = {
-        rubs: float(ex.problem.explained(ex.chosen, friction=rubs)[list(c.joints)].max()) for rubs in (True, False)
-    }
     own = odds[c.slug, c.joints]
+    joints = list(c.joints)
+    explained = {rubs: ex.problem.explained(ex.chosen, friction=rubs)[joints] for rubs in (True, False)}
+    # Of what acts on several joints no more is feigned at one of them than comes from there.
+    there = max(own, 0.0) * ex.problem.parts[joints, index] if len(joints) > 1 else np.inf
     for key, value in odds.items():
         if key == (c.slug, c.joints) or key[0] in c.effect.contains:
             continue  # a special case has already lost by more than what an imperfect law could feign
         rival = CATALOGUE[key[0]]
-        excess, guard = value - own, rival.feigned**2 * explained[rival.friction]
+        excess, guard = value - own, float(np.sum(np.minimum(rival.feigned**2 * explained[rival.friction], there)))
         if c.slug in rival.contains:
             # A law that contains the named one was not needed; even odds where the search would have taken it.  Below,
             # as much of its handicap counts as imperfect laws have a part in the hurdle: on clean data, the evidence.

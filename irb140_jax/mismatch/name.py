@@ -68,7 +68,8 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
     """Add the best candidate, settle around it, and again, until none is worth adding."""
     seen: set[frozenset[int]] = set()
     while len(chosen) < MOST:
-        scores = problem.scores(chosen) + problem.entry - _hurdle(problem, chosen) - ACCEPT
+        scores = problem.scores(chosen) + problem.entry
+        scores = scores - problem.feigned(chosen, scores) - ACCEPT
         scores[[*chosen, *banned]] = -np.inf
         scores = np.where(conflicts(problem, chosen), -np.inf, scores)
         best = int(np.argmax(scores))
@@ -79,18 +80,6 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
             break  # adding and settling undo each other
         seen.add(frozenset(chosen))
     return chosen
-
-
-def _hurdle(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
-    """Log odds that imperfect laws of the set could feign for each candidate, at the joint where they are largest.
-
-    Friction is feigned by friction: what tilts, weighs or springs does not turn with the direction of motion.
-    """
-    rubs = np.array([c.effect.friction for c in problem.candidates])
-    by_friction, by_all = problem.explained(chosen, friction=True), problem.explained(chosen)
-    explained = np.where(rubs, by_friction[:, None], by_all[:, None])
-    explained = np.max(np.where(problem.at_joint, explained, 0.0), axis=0)
-    return np.array([c.effect.feigned**2 for c in problem.candidates]) * explained
 
 
 def conflicts(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
@@ -139,7 +128,6 @@ def _exchange(
     problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...], banned: frozenset[int]
 ) -> tuple[int, ...] | None:
     """The best replacement of one or two members by one candidate that shares a joint with them."""
-    hurdle = _hurdle(problem, chosen)
     best, best_move = 1e-6, None
     pairs = [p for p in itertools.combinations(near, 2)
              if problem.candidates[p[0]].joints == problem.candidates[p[1]].joints]  # fmt: skip
@@ -149,6 +137,7 @@ def _exchange(
         scores = problem.scores(rest, {j for c in old for j in c.joints}) - problem.odds(rest, drop)
         scores[conflicts(problem, rest)] = -np.inf
         scores[[*drop, *banned]] = -np.inf
+        hurdle = problem.feigned(chosen, scores)
         for i in np.flatnonzero(scores > best):
             c = problem.candidates[i]
             if len(drop) == 1 and c.slug in old[0].effect.contains:
@@ -164,7 +153,6 @@ def _exchange(
 
 def _simplify(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) -> tuple[int, ...] | None:
     """Put special cases or ordinary friction in the place of a law where the difference is not clear."""
-    hurdle = _hurdle(problem, chosen)
     for d in near:
         rest = tuple(x for x in chosen if x != d)
         options = possible_beside(problem, rest, simpler(problem, d))
@@ -175,7 +163,8 @@ def _simplify(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) 
         if not odds:
             continue
         best = max(odds, key=lambda o: odds[o])
-        if problem.odds(rest, (d,)) - odds[best] < PREFER + hurdle[d]:
+        more = problem.odds(rest, (d,)) - odds[best]
+        if more < PREFER + problem.feigned(chosen, more)[d]:
             return (*rest, *best)
     return None
 
@@ -210,7 +199,8 @@ def _remove(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) ->
         rest = tuple(x for x in chosen if x != d)
         # The score knows what is admissible: what was so when it entered need not be so beside later members.
         fits = np.isfinite(problem.scores(rest, problem.candidates[d].joints)[d])
-        odds[d] = problem.odds(rest, (d,)) + problem.entry[d] - _hurdle(problem, rest)[d] if fits else -np.inf
+        own = problem.odds(rest, (d,)) + problem.entry[d]
+        odds[d] = own - problem.feigned(rest, own)[d] if fits else -np.inf
     if not odds or min(odds.values()) >= ACCEPT:
         return None
     weakest = min(odds, key=lambda d: odds[d])

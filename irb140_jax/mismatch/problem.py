@@ -29,7 +29,7 @@ class Problem:
     Attributes:
         H: Gram matrix over [nuisances | amplitudes | y], nuisances eliminated, shape (K + 1, K + 1).
         per_joint: Gram matrices of each joint's rows before elimination, shape (n, K + 1, K + 1).
-        torque_energy: Squared whitened logged torque of each joint, shape (n,).
+        torque_energy: Squared whitened logged torque of each recording and joint, shape (recordings, n).
         candidates: What may be in the set.
         offset: Column of the first amplitude.
         log_prior: Log prior odds of each candidate beside its rivals, shape (len(candidates),).
@@ -51,6 +51,11 @@ class Problem:
     summed: np.ndarray
     least: np.ndarray
 
+    @cached_property
+    def least_share(self) -> np.ndarray:
+        """Least share of its joint's torque that each candidate may have; none for what comes once and goes."""
+        return np.array([0.0 if c.effect.once else LEAST_SHARE for c in self.candidates])
+
     def columns(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Columns of H that a set uses."""
         parts = [self.candidates[c].columns + self.offset for c in chosen]
@@ -60,6 +65,20 @@ class Problem:
     def groups(self) -> tuple[Layout, ...]:
         """All candidates, in groups of equal size."""
         return layouts(self.candidates, self.offset)
+
+    @cached_property
+    def motions(self) -> np.ndarray:
+        """How many recordings, by their torque, each joint's evidence comes from, shape (n,)."""
+        total = self.torque_energy.sum(axis=0)
+        return 1.0 / np.sum((self.torque_energy / total) ** 2, axis=0)
+
+    @cached_property
+    def parts(self) -> np.ndarray:
+        """Part of each candidate's squared whitened torque at each joint, by its prior, shape (n, candidates)."""
+        parts = np.zeros((len(self.per_joint), len(self.candidates)))
+        for g, G in zip(self.groups, self._own_grams, strict=True):
+            parts[:, g.which] = np.einsum("jikk->ji", G)
+        return parts / np.maximum(parts.sum(axis=0), 1e-300)
 
     @cached_property
     def at_joint(self) -> np.ndarray:
@@ -82,7 +101,7 @@ class Problem:
         with np.errstate(invalid="ignore"):
             bad = np.any((mean < self.lowest - 1e-9) | (mean > self.highest + 1e-9), axis=1)
         bad |= np.nansum(mean * self.summed, axis=1) < self.least
-        return np.where(bad | (self._share(mean) < LEAST_SHARE), -np.inf, gain + self.log_prior)
+        return np.where(bad | (self._share(mean) < self.least_share), -np.inf, gain + self.log_prior)
 
     def eliminated_near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
         """Gram matrix of some columns and y, with a set eliminated."""
@@ -121,7 +140,7 @@ class Problem:
             k = g.columns.shape[1]
             v = np.nan_to_num(mean[g.which, :k])
             energy = np.einsum("ik,jikl,il->ji", v, G, v)
-            share[g.which] = np.sqrt(np.max(energy / self.torque_energy[:, None], axis=0))
+            share[g.which] = np.sqrt(np.max(energy / self.torque_energy.sum(axis=0)[:, None], axis=0))
         return share
 
     @cached_property
@@ -138,10 +157,31 @@ class Problem:
         H = self.eliminated_near(rest, columns)
         return gain_of(H, np.arange(len(columns))) + float(sum(self.log_prior[c] for c in chosen))
 
+    def feigned(self, chosen: tuple[int, ...], odds: np.ndarray | float) -> np.ndarray:
+        """Part of each candidate's log odds that imperfect laws of a set could feign, shape (len(candidates),).
+
+        Friction is feigned by friction: what tilts, weighs or springs does not turn with the direction of motion.  What
+        acts on several joints may be feigned at each, for reversals that encoders do not see are late at all of them;
+        but no more at a joint than comes from there.
+
+        Args:
+            chosen: The set.
+            odds: Log odds of each candidate, or of all.
+        """
+        shares = np.array([c.effect.feigned**2 for c in self.candidates])
+        rubs = np.array([c.effect.friction for c in self.candidates])
+        by_friction, by_all = (self.explained(chosen, friction=f)[:, None] for f in (True, False))
+        feigned = np.where(self.at_joint, shares * np.where(rubs, by_friction, by_all), 0.0)
+        there = np.maximum(odds, 0.0) * self.parts
+        alone = self.at_joint.sum(axis=0) == 1
+        return np.where(alone, feigned, np.minimum(feigned, there)).sum(axis=0)
+
     def explained(self, chosen: tuple[int, ...], *, friction: bool = False) -> np.ndarray:
         """Half the whitened squared torque that a set, or the friction in it, explains at each joint, shape (n,).
 
-        What has no form that could err does not count.
+        Friction counts for one recording, on average: what its form errs by goes with warmth, load and motion, and
+        resembles another law of friction in one recording by chance, not in all.  Whatever goes with position is the
+        same in all.  What has no form that could err does not count.
         """
         index = self.columns(chosen)
         if len(index) == 0:
@@ -151,7 +191,7 @@ class Problem:
         counts = np.concatenate([np.full(len(m.columns), c) for m, c in zip(members, counted, strict=True)])
         v = np.where(counts, posterior(self.H, index).mean, 0.0)
         explained = np.einsum("i,jik,k->j", v, self.per_joint[:, index[:, None], index[None, :]], v)
-        return 0.5 * explained
+        return 0.5 * explained / (self.motions if friction else 1.0)
 
 
 def group_odds(problem: Problem, chosen: tuple[int, ...]) -> dict[tuple[str, tuple[int, ...]], float]:

@@ -60,7 +60,8 @@ class Questions:
 
         The log that either predicts is added to the recordings there are; the other does with it what it can, with
         inertials, amplitudes and shapes free: half the divergence that T-optimal designs maximise.  What an imperfect
-        law could feign (`feigned`) is taken off, as the search does; below zero, they stay even.
+        law could feign (`feigned`) is taken off as if all were one recording, so that the motion convinces without the
+        others' help; below zero, they stay even.
 
         Source: Atkinson and Fedorov, Biometrika 62(1), 1975; Lopez-Fidalgo, Tommasi, Trandafir, JRSS B 69(2), 2007.
         """

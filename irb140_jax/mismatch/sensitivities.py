@@ -10,7 +10,7 @@ from irb140_jax.dynamics.chain import Plan, chain
 from irb140_jax.dynamics.newton_euler import rigid_torque
 from irb140_jax.dynamics.regressor import regressor_blocks
 from irb140_jax.effects.gravity_tilt import across
-from irb140_jax.robot import Robot
+from irb140_jax.robot import Robot, about_origin
 from irb140_jax.types import Joints, JointSamples, Scalar
 
 
@@ -53,10 +53,10 @@ class Sensitivities(eqx.Module):
         return across(self.robot.gravity)
 
     @property
-    def last_link(self) -> Float[Array, "T n 10"]:
-        """Torque per inertial parameter of the last link."""
+    def held(self) -> Float[Array, "T n 10"]:
+        """Torque per inertial parameter of a body held by the last link, about the tool."""
         block = regressor_blocks(chain(self.robot, self.ahead), self.q.T, self.qd.T, self.qdd.T)[-1]
-        return jnp.moveaxis(block, -1, 0)
+        return jnp.moveaxis(block, -1, 0) @ about_origin(self.robot.tool_position)
 
     @property
     def by_q(self) -> Float[Array, "T n n"]:

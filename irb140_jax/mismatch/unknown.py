@@ -30,6 +30,7 @@ TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
 BELITTLED = 0.2  # size of a nameless structure, over that of a finding, from which the finding may be a part of it ...
 NO_WORSE = 0.2  # ... if its competitor errs by at most so much more without the finding, times that ratio
 BETTER = 0.95  # and without any finding: where it distorts what is simple without it
+SAME = 0.9  # of a rarer finding's variance, from which the structure's variables are the finding's own
 ALMOST_ALL = 0.8
 NEARLY = 2.0 / 3.0
 
@@ -254,9 +255,10 @@ def _centred(y: np.ndarray, constant: np.ndarray) -> np.ndarray:
 
 
 def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: float) -> tuple[int, ...]:
-    """Findings that only stand in for the structure: its own variables predict as well without them.
+    """Findings that only stand in for the structure, smallest first, each on top of those before.
 
-    Smallest first, each on top of those before.
+    Its variables predict as well without them; or they are rarer laws that leave more than they name, or so much in
+    their own variables that the form must be another.
     """
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     w, at, torques = post.mean * ex.data.scale[post.columns], ex.data.nuisances, {}
@@ -270,10 +272,13 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
             torques[index] = rows.of([x[:, j] for x in torque])
     out, y = [], rows.residual
     for index in sorted(torques, key=lambda i: float(np.sum(torques[i] ** 2))):
-        without = _centred(y + torques[index] / rows.level, 1.0 / rows.level)
+        level = 1.0 / rows.level
+        own, without = (_centred(x, level) for x in (torques[index] * level, y + torques[index] * level))
         ratio = size / np.sqrt(np.mean(torques[index] ** 2))
         error = _missed(carrier, without[:, None])[0] / _missed(carrier, y[:, None])[0]
-        if error < BETTER or (ratio > BELITTLED and error < 1.0 + NO_WORSE * min(ratio, 1.0)):
+        form = ratio > 1.0 or _scores(carrier, own[:, None])[0] > SAME
+        form = form and not ex.data.candidates[index].effect.ordinary
+        if error < BETTER or (ratio > BELITTLED and (form or error < 1.0 + NO_WORSE * min(ratio, 1.0))):
             out.append(index)
             y = without
     return tuple(out)

@@ -3,6 +3,7 @@
 from irb140_jax.robot.mjcf import load_robot as load_robot
 from irb140_jax.robot.mjcf import robot_from_model as robot_from_model
 from irb140_jax.robot.robot import Robot as Robot
+from irb140_jax.robot.robot import about_origin as about_origin
 from irb140_jax.robot.robot import with_phi as with_phi
 from irb140_jax.robot.shipped import irb140 as irb140
 from irb140_jax.robot.shipped import irb140_path as irb140_path

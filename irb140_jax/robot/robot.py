@@ -135,3 +135,19 @@ def with_phi(robot: Robot, phi: Inertials) -> Robot:
     inertia = about_origin - mass[:, None, None] * (c2 * jnp.eye(3) - com[:, :, None] * com[:, None, :])
     where = lambda r: (r.mass, r.com, r.inertia)  # noqa: E731
     return eqx.tree_at(where, robot, (mass, com, inertia))
+
+
+def about_origin(point: Vec3) -> Float[Array, "10 10"]:
+    """Matrix from inertial parameters about a point of a link, axes of its frame, to those about the frame's origin.
+
+    Args:
+        point: Position in the link's frame [m], shape (3,).
+    """
+
+    def moved(phi: Float[Array, "10"]) -> Float[Array, "10"]:
+        mass, h = phi[0], phi[1:4]
+        both = jnp.outer(point, h) + jnp.outer(h, point) + mass * jnp.outer(point, point)
+        steiner = jnp.trace(both) * jnp.eye(3) - both
+        return jnp.concatenate([mass[None], h + mass * point, phi[4:] + steiner[jnp.triu_indices(3)]])
+
+    return jax.jacfwd(moved)(jnp.zeros(10))

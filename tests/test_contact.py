@@ -1,0 +1,70 @@
+"""A wall felt by an arm that moves in a plane: what of it is known, and what is not."""
+
+import numpy as np
+import pytest
+
+from irb140_jax.effects import Scales
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.effects.contact import _wall
+from irb140_jax.effects.left_over import LeftOver
+
+CONTACT = CATALOGUE["contact"]
+ACROSS = np.array([0.6, 0.0, 0.8])  # the arm moves in the plane across it
+STIFFNESS = 800.0
+NONE = np.zeros(2)
+SCALES = Scales(NONE, NONE, NONE, NONE, NONE, 9.0, NONE)  # a wall asks for none of them
+
+
+def path(seed: int, rows: int = 900) -> tuple[np.ndarray, np.ndarray]:
+    """Tool (rows, 3) of a two-link arm in a plane that is off the origin, and its Jacobian (rows, 2, 3)."""
+    rng, t = np.random.default_rng(seed), np.linspace(0.0, 9.0, rows)
+    q1, q2 = (np.sin(t * rng.uniform(0.8, 2.0) + rng.uniform(0, 6)) for _ in range(2))
+    x, y = np.array([0.8, 0.0, -0.6]), np.array([0.0, 1.0, 0.0])
+    along = lambda a: np.outer(np.cos(a), x) + np.outer(np.sin(a), y)  # noqa: E731
+    turned = lambda a: np.outer(-np.sin(a), x) + np.outer(np.cos(a), y)  # noqa: E731
+    tool = 0.3 * ACROSS + 0.4 * along(q1) + 0.3 * along(q1 + q2)
+    second = 0.3 * turned(q1 + q2)
+    return tool, np.stack([0.4 * turned(q1) + second, second], axis=1)
+
+
+def left_over(seed: int, normal: np.ndarray) -> tuple[LeftOver, np.ndarray]:
+    """A wall across this direction, touched in a sixth of the rows, with some noise; and its shape."""
+    tool, jacobian = path(seed)
+    shape = np.append(normal, np.quantile(tool @ normal, 1 / 6))
+    y = STIFFNESS * _wall(tool, jacobian, shape, np)
+    y += 1e-3 * np.std(y) * np.random.default_rng(seed + 1).normal(size=y.shape)
+    zero, weight = np.zeros(len(tool)), np.full(y.shape, 1e3 / np.std(y))
+    return LeftOver(
+        zero.astype(int), np.linspace(0.0, 9.0, len(tool)), np.zeros_like(y), tool, jacobian, weight, y * weight,
+        np.ones((*y.shape, 1)),
+    ), shape  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wall_is_sought_where_the_arm_moves_and_tilted_only_there(seed):
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=3)
+    left, wall = left_over(seed, normal / np.linalg.norm(normal))
+    grid = CONTACT.scout(left, SCALES, np.arange(2))
+    assert grid is not None
+    np.testing.assert_allclose(grid[:, :3] @ ACROSS, 0.0, atol=1e-9)
+    flat = wall[:3] - ACROSS * (ACROSS @ wall[:3])
+    size = np.linalg.norm(flat)
+    assert grid[0, :3] @ flat / size > np.cos(0.02)
+    assert grid[0, 3] == pytest.approx((wall[3] - 0.3 * (ACROSS @ wall[:3])) / size, abs=5e-3)
+    finer = CONTACT.finer(grid, grid[3])
+    np.testing.assert_allclose(finer[:, :3] @ ACROSS, 0.0, atol=1e-9)
+    assert np.ptp(finer, axis=0).max() < 0.6 * np.ptp(grid, axis=0).max()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_walls_that_are_alike_push_alike(seed):
+    normal = np.array([0.0, 1.0, 0.0])
+    left, wall = left_over(seed, normal)
+    alike = CONTACT.alike(left, np.array([STIFFNESS]), wall)
+    assert len(alike) == 2 and not np.allclose(alike[0], alike[1])
+    pushed = STIFFNESS * _wall(left.tool, left.tool_jacobian, wall, np)
+    for stiffness, *shape in alike:
+        assert np.linalg.norm(shape[:3]) == pytest.approx(1.0)
+        other = stiffness * _wall(left.tool, left.tool_jacobian, np.array(shape), np)
+        np.testing.assert_allclose(other, pushed, atol=1e-9 * np.abs(pushed).max())

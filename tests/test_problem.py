@@ -1,0 +1,80 @@
+"""What imperfect laws could feign: by which laws, at which joints, over how many recordings."""
+
+import numpy as np
+import pytest
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.problem import LEAST_SHARE, Problem
+
+ROWS = 80
+RNG = np.random.default_rng(0)
+TURNS, WAVE = np.sign(RNG.normal(size=ROWS)), RNG.normal(size=ROWS)
+WAVE -= TURNS * (TURNS @ WAVE) / ROWS
+
+
+def problem(members, y, recordings: int = 1) -> Problem:
+    """Of candidates (slug, joints, torque per unit at each joint) for the torque y, each of shape (n, ROWS)."""
+    X = np.stack([np.asarray(torque, dtype=float) for _, _, torque in members] + [y], axis=-1)
+    per_joint = np.einsum("jtk,jtl->jkl", X, X)
+    limit, none = np.full((len(members), 1), np.inf), np.zeros(len(members))
+    candidates = tuple(
+        Candidate(CATALOGUE[slug], joints, np.zeros(0), np.array([k]), (0,), -limit[k], limit[k])
+        for k, (slug, joints, _) in enumerate(members)
+    )
+    energy = np.tile(np.maximum(np.sum(np.square(y), axis=1) / recordings, 1e-300), (recordings, 1))
+    return Problem(
+        per_joint.sum(axis=0), per_joint, energy, candidates, 0, none, none, -limit, limit,
+        np.zeros((len(members), 1)), -limit[:, 0],
+    )  # fmt: skip
+
+
+def explained_by_friction(level: float) -> float:
+    """Half the squared torque of a Coulomb friction fitted with a prior of one."""
+    w = level * ROWS / (ROWS + 1.0)
+    return 0.5 * w**2 * ROWS
+
+
+FRICTION = ("coulomb_friction", (0,), [TURNS])
+RARER = ("stribeck_friction", (0,), [TURNS * np.abs(WAVE)])
+SPRING = ("gravity_spring", (0,), [WAVE])
+
+
+@pytest.mark.parametrize("slug", ["torque_offset", "payload", "gravity_tilt", "rotor_inertia", "encoder_offset"])
+def test_what_has_no_form_that_could_err_feigns_nothing(slug):
+    own = (slug, (0,), [np.ones(ROWS)])
+    y = np.atleast_2d(3.0 * np.ones(ROWS) + 2.0 * TURNS)
+    there = problem([own, FRICTION, RARER, SPRING], y)
+    assert np.all(there.explained((0,)) == 0.0)
+    assert np.all(there.feigned((0,), 1e6) == 0.0)
+    X = np.stack([np.ones(ROWS), TURNS], axis=1)
+    w = np.linalg.solve(X.T @ X + np.eye(2), X.T @ y[0])
+    assert there.explained((0, 1))[0] == pytest.approx(0.5 * w[1] ** 2 * ROWS)
+
+
+def test_friction_feigns_friction_in_one_recording_and_anything_else_in_all():
+    y = 5.0 * TURNS[None]
+    one, three = (problem([FRICTION, RARER, SPRING], y, n) for n in (1, 3))
+    feigned = explained_by_friction(5.0) * np.array([CATALOGUE[s].feigned ** 2 for s in (RARER[0], SPRING[0])])
+    np.testing.assert_allclose(one.feigned((0,), 1e6)[1:], feigned, rtol=1e-9)
+    np.testing.assert_allclose(three.feigned((0,), 1e6)[1:], feigned / [3.0, 1.0], rtol=1e-9)
+
+
+def test_no_more_is_feigned_at_a_joint_than_comes_from_there():
+    small, large = 0.1 * WAVE, WAVE  # what both joints feel of the payload
+    payload, nothing = ("payload", (0, 1), [small, large]), np.zeros(ROWS)
+    there = problem([("coulomb_friction", (0,), [TURNS, nothing]), payload], np.stack([50.0 * TURNS, nothing]))
+    of_friction = CATALOGUE["payload"].feigned ** 2 * explained_by_friction(50.0)
+    part = 0.01 / 1.01  # of its squared torque on the joint that rubs
+    assert of_friction > 10.0 * part * 100.0
+    assert there.feigned((0,), 100.0)[1] == pytest.approx(part * 100.0)
+    assert there.feigned((0,), 1e9)[1] == pytest.approx(of_friction)
+    assert there.feigned((0,), -5.0)[1] == 0.0
+
+
+def test_what_comes_once_may_be_small_over_all():
+    tiny = 0.5 * LEAST_SHARE
+    y = WAVE + tiny * TURNS
+    members = [("external_wrench", (0,), [TURNS]), ("torque_ripple", (0,), [TURNS])]
+    scores = problem(members, 1e4 * y[None]).scores(())
+    assert np.isfinite(scores).tolist() == [True, False]

@@ -1,0 +1,29 @@
+"""Physics in no library, made by MuJoCo: it is located by joint and by variables, and no name is forced upon it."""
+
+import pytest
+
+from irb140_jax.mismatch import diagnose
+from irb140_jax.recordings.conceal import Concealment, conceal
+from irb140_jax.recordings.excite import three_motions
+from irb140_jax.robot import irb140, irb140_path
+
+SHARE = 0.15  # of the joint's torque
+# Where it sits and what the words for its variables must hold.
+OUTSIDE = {
+    # A gain would take four fifths of it: what that leaves is made of the gain's own variables.
+    "magnetic_saturation": ("joint1", "load"),
+    "rotor_gyroscope": ("joint2", "together with the joint's own"),
+}
+
+
+@pytest.mark.parametrize("slug", OUTSIDE)
+def test_it_is_located_by_joint_and_variables_and_not_named(slug):
+    joint, variables = OUTSIDE[slug]
+    robot = irb140()
+    motions = three_motions(robot, 15.0, 500.0, seed=1)
+    case = conceal(str(irb140_path()), [Concealment(slug, (joint,), SHARE)], motions, seed=2)
+    diagnosis = diagnose(robot, case.recordings).diagnosis
+    assert diagnosis["findings"] == [] and diagnosis["verdict"] == "unexplained"
+    (rest,) = diagnosis["unexplained"]
+    assert rest["joints"] == [joint]
+    assert variables in str(rest)
