@@ -168,13 +168,21 @@ class Problem:
             chosen: The set.
             odds: Log odds of each candidate, or of all.
         """
-        shares = np.array([c.effect.feigned**2 for c in self.candidates])
-        rubs = np.array([c.effect.friction for c in self.candidates])
-        by_friction, by_all = (self.explained(chosen, friction=f)[:, None] for f in (True, False))
-        feigned = np.where(self.at_joint, shares * np.where(rubs, by_friction, by_all), 0.0)
+        if chosen not in self._most_feigned:
+            shares = np.array([c.effect.feigned**2 for c in self.candidates])
+            rubs = np.array([c.effect.friction for c in self.candidates])
+            by_friction, by_all = (self.explained(chosen, friction=f)[:, None] for f in (True, False))
+            most = np.where(self.at_joint, shares * np.where(rubs, by_friction, by_all), 0.0)
+            self._most_feigned.clear()  # a search asks for the same set many times, and then for another
+            self._most_feigned[chosen] = most
+        most = self._most_feigned[chosen]
         there = np.maximum(odds, 0.0) * self.parts
         alone = self.at_joint.sum(axis=0) == 1
-        return np.where(alone, feigned, np.minimum(feigned, there)).sum(axis=0)
+        return np.where(alone, most, np.minimum(most, there)).sum(axis=0)
+
+    @cached_property
+    def _most_feigned(self) -> dict[tuple[int, ...], np.ndarray]:
+        return {}
 
     def explained(self, chosen: tuple[int, ...], *, friction: bool = False) -> np.ndarray:
         """Half the whitened squared torque that a set, or the friction in it, explains at each joint, shape (n,).
