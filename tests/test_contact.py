@@ -52,9 +52,24 @@ def test_a_wall_is_sought_where_the_arm_moves_and_tilted_only_there(seed):
     size = np.linalg.norm(flat)
     assert grid[0, :3] @ flat / size > np.cos(0.02)
     assert grid[0, 3] == pytest.approx((wall[3] - 0.3 * (ACROSS @ wall[:3])) / size, abs=5e-3)
-    finer = CONTACT.finer(grid, grid[3])
-    np.testing.assert_allclose(finer[:, :3] @ ACROSS, 0.0, atol=1e-9)
-    assert np.ptp(finer, axis=0).max() < 0.6 * np.ptp(grid, axis=0).max()
+    rim = 1 + np.argmax(np.abs(grid[1:5] - grid[0]).sum(axis=1))
+    moved, kept = CONTACT.finer(grid, grid[rim]), CONTACT.finer(grid, grid[0])
+    width = lambda g: np.ptp(g[1:5, :3], axis=0).max()  # noqa: E731
+    assert width(kept) == pytest.approx(0.5 * width(grid), rel=0.01)
+    # Where the best is at the rim, the next grid goes on from there as wide as before, and not out of the plane.
+    assert width(moved) == pytest.approx(width(grid), rel=0.03)
+    np.testing.assert_allclose(moved[:, :3] @ ACROSS, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wall_is_turned_about_the_place_of_contact(seed):
+    left, _ = left_over(seed, np.array([0.0, 1.0, 0.0]))
+    grid = CONTACT.scout(left, SCALES, np.arange(2))
+    assert grid is not None
+    depth = np.maximum(grid[:, 3] - left.tool @ grid[:, :3].T, 0.0)
+    # To first order a turn makes the wall deeper on one side and less deep on the other, by as much.
+    np.testing.assert_allclose(depth[:, 1:5].sum(axis=0), depth[:, 0].sum(), rtol=0.01)
+    assert depth[:, 5].sum() > 1.02 * depth[:, 0].sum()
 
 
 @pytest.mark.parametrize("seed", range(4))

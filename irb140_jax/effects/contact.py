@@ -48,23 +48,19 @@ class Contact(AbstractEffect):
         return np.arange(robot.n)[None, :]
 
     def shapes(self, scales, joints):
-        return self._around(np.array([0.0, 0.0, 1.0, 0.0]), np.eye(3)[:2], TILT, SHIFT)
+        return _around(np.array([0.0, 0.0, 1.0, 0.0]), np.eye(4)[:2], TILT, SHIFT)
 
     def refines(self):
         return True
 
     def finer(self, grid, best):
-        step = 0.5 * np.max(np.abs(grid - best), axis=0)
-        axes = [(b - a)[:3] for a, b in (grid[1:3], grid[3:5])]
-        axes = np.array([a / max(float(np.linalg.norm(a)), 1e-12) for a in axes])
-        return self._around(best, axes, max(float(step[:3].max()), 1e-4), max(float(step[3]), 1e-6))
-
-    @staticmethod
-    def _around(best, axes, tilt, shift):
-        """The wall, tilted both ways towards each of two axes, and moved in and out, shape (7, 4)."""
-        normals = [best[:3] + tilt * s * a for a in axes for s in (-1.0, 1.0)]
-        tilted = [np.append(n / np.linalg.norm(n), best[3]) for n in normals]
-        return np.array([best, *tilted, best + [0, 0, 0, shift], best - [0, 0, 0, shift]])
+        turns, shift = 0.5 * (grid[2:5:2] - grid[1:4:2]), 0.5 * (grid[5, 3] - grid[6, 3])
+        tilts = np.linalg.norm(turns[:, :3], axis=1)
+        turns = turns / np.maximum(tilts, 1e-12)[:, None]
+        # As wide as before in the direction in which it moved.
+        at = int(np.argmin(np.abs(grid - best).sum(axis=1)))
+        tilt = float(tilts.max()) * (1.0 if 1 <= at <= 4 else 0.5)
+        return _around(best, turns, max(tilt, 1e-5), max(float(shift) * (1.0 if at > 4 else 0.5), 1e-7))
 
     def scout(self, left, scales, joints):
         left = left.every(THIN)
@@ -82,7 +78,10 @@ class Contact(AbstractEffect):
             return None  # no better than the best of so many is by chance
         found = [_climbed(left, walls[i], felt, travel) for i in _apart(walls[:, :3], gains)]
         best = found[int(np.argmax([_gain(left, wall[None])[0] for wall in found]))]
-        return self._around(best, _across(best[:3], felt), TILT, SHIFT * travel)
+        # About the place of contact: turned about any other, a wall must be moved as well to stand where it did.
+        across = _across(best[:3], felt)
+        touched = left.tool[left.tool @ best[:3] < best[3]].mean(axis=0)
+        return _around(best, np.column_stack([across, across @ touched]), TILT, SHIFT * travel)
 
     def alike(self, left, w, shape):
         felt, middle = _felt(left.tool)
@@ -113,6 +112,20 @@ class Contact(AbstractEffect):
             f"{names}: where the tool is less than {values['position']:.3g} m along ({normal}) of the world; it is "
             f"pushed back with {values['stiffness']:.3g} N/m"
         )
+
+
+def _around(best, turns, tilt, shift):
+    """The wall, turned a little both ways in each of two ways, and moved in and out, shape (7, 4).
+
+    Args:
+        best: Normal and position.
+        turns: Change of both per radian, shape (2, 4).
+        tilt: By how much it is turned [rad].
+        shift: By how much it is moved [m].
+    """
+    turned = np.array([best + tilt * s * turn for turn in turns for s in (-1.0, 1.0)])
+    turned[:, :3] /= np.linalg.norm(turned[:, :3], axis=1, keepdims=True)
+    return np.array([best, *turned, best + [0, 0, 0, shift], best - [0, 0, 0, shift]])
 
 
 def _wall(tool, tool_jacobian, shape, xp):
