@@ -16,6 +16,7 @@ SHORTEST = 0.2  # s; what lasts less is a blow, or a misfit
 THIN = 2  # every second row in the scan; the grid of the search then sees all
 NEAR = (-1.0, 0.0, 1.0)  # grid around the best start and end, in steps
 STEP = 0.05  # s, first step of that grid
+UNFELT = 1e-3  # of the strongest direction of the tool's Jacobian: forces along it move no joint
 
 
 class ExternalWrench(AbstractEffect):
@@ -90,6 +91,11 @@ class ExternalWrench(AbstractEffect):
             if -at.fun > gain:
                 best, gain = np.array([*at.x, recording + 1.0]), -at.fun
         return None if best is None else self._around(best, STEP)
+
+    def alike(self, left, w, shape):
+        _, size, axes = np.linalg.svd(left.tool_jacobian.reshape(-1, 3), full_matrices=False)
+        unfelt = axes[size < UNFELT * max(size[0], 1e-300)] * np.linalg.norm(w)
+        return np.array([np.concatenate([shape, w + s * a]) for a in unfelt for s in (-1.0, 1.0)]).reshape(-1, 6)
 
     def columns(self, motion, joints, shape):
         here = jnp.where(motion.recording + 1.0 == shape[2], 1.0, 0.0)

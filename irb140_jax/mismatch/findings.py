@@ -170,7 +170,7 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
     joints = list(c.joints)
     explained = {rubs: ex.problem.explained(ex.chosen, friction=rubs)[joints] for rubs in (True, False)}
     # Of what acts on several joints no more is feigned at one of them than comes from there.
-    there = max(own, 0.0) * ex.problem.parts[joints, index] if len(joints) > 1 else np.inf
+    there = max(own, 0.0) * ex.problem.parts(rest)[joints, index] if len(joints) > 1 else np.inf
     for key, value in odds.items():
         if key == (c.slug, c.joints) or key[0] in c.effect.contains:
             continue  # a special case has already lost by more than what an imperfect law could feign

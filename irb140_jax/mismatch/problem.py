@@ -72,13 +72,21 @@ class Problem:
         total = self.torque_energy.sum(axis=0)
         return 1.0 / np.sum((self.torque_energy / total) ** 2, axis=0)
 
+    def parts(self, chosen: tuple[int, ...]) -> np.ndarray:
+        """Part of the squared whitened torque at each joint, of candidates on several joints as they fit beside a set.
+
+        Shape (n, candidates); one for those on a joint alone.
+        """
+        near, parts = self._on_several, self.at_joint.astype(float)
+        if len(near.which):
+            H = self.eliminated_near(chosen, near.columns)
+            energy = self._energy(gains(H, near.groups, len(self.candidates), self.lowest.shape[1])[1])[:, near.which]
+            parts[:, near.which] = energy / np.maximum(energy.sum(axis=0), 1e-300)
+        return parts
+
     @cached_property
-    def parts(self) -> np.ndarray:
-        """Part of each candidate's squared whitened torque at each joint, by its prior, shape (n, candidates)."""
-        parts = np.zeros((len(self.per_joint), len(self.candidates)))
-        for g, G in zip(self.groups, self._own_grams, strict=True):
-            parts[:, g.which] = np.einsum("jikk->ji", G)
-        return parts / np.maximum(parts.sum(axis=0), 1e-300)
+    def _on_several(self) -> "Neighbourhood":
+        return self._numbered(np.flatnonzero(self.at_joint.sum(axis=0) > 1))
 
     @cached_property
     def at_joint(self) -> np.ndarray:
@@ -119,15 +127,19 @@ class Problem:
             which = np.arange(len(self.candidates))
             if joints is not None:
                 which = np.flatnonzero(self.at_joint[sorted(joints)].reshape(len(joints), -1).any(axis=0))
-            columns = np.unique(np.concatenate([self.candidates[i].columns for i in which])) + self.offset
-            number = {int(c): k for k, c in enumerate(columns)}
-            groups: dict[int, list[int]] = defaultdict(list)
-            for i in which:
-                groups[len(self.candidates[i].columns)].append(int(i))
-            local = lambda i: [number[int(c + self.offset)] for c in self.candidates[i].columns]  # noqa: E731
-            layout = tuple(Layout(np.array(m), np.array([local(i) for i in m])) for m in groups.values())
-            self._neighbourhoods[joints] = Neighbourhood(which, columns, layout)
+            self._neighbourhoods[joints] = self._numbered(which)
         return self._neighbourhoods[joints]
+
+    def _numbered(self, which: np.ndarray) -> "Neighbourhood":
+        """Some candidates with their columns numbered among themselves."""
+        columns = np.unique(np.concatenate([np.zeros(0, int), *(self.candidates[i].columns for i in which)]))
+        number = {int(c): k for k, c in enumerate(columns)}
+        groups: dict[int, list[int]] = defaultdict(list)
+        for i in which:
+            groups[len(self.candidates[i].columns)].append(int(i))
+        local = lambda i: [number[int(c)] for c in self.candidates[i].columns]  # noqa: E731
+        layout = tuple(Layout(np.array(m), np.array([local(i) for i in m])) for m in groups.values())
+        return Neighbourhood(which, columns + self.offset, layout)
 
     @cached_property
     def _neighbourhoods(self) -> dict[frozenset[int] | None, "Neighbourhood"]:
@@ -135,13 +147,15 @@ class Problem:
 
     def _share(self, mean: np.ndarray) -> np.ndarray:
         """Torque of each candidate with these amplitudes, as a share of the torque of the joint it matters most to."""
-        share = np.zeros(len(self.candidates))
+        return np.sqrt(np.max(self._energy(mean) / self.torque_energy.sum(axis=0)[:, None], axis=0))
+
+    def _energy(self, mean: np.ndarray) -> np.ndarray:
+        """Squared whitened torque of each candidate with these amplitudes at each joint, shape (n, candidates)."""
+        energy = np.zeros((len(self.per_joint), len(self.candidates)))
         for g, G in zip(self.groups, self._own_grams, strict=True):
-            k = g.columns.shape[1]
-            v = np.nan_to_num(mean[g.which, :k])
-            energy = np.einsum("ik,jikl,il->ji", v, G, v)
-            share[g.which] = np.sqrt(np.max(energy / self.torque_energy.sum(axis=0)[:, None], axis=0))
-        return share
+            v = np.nan_to_num(mean[g.which, : g.columns.shape[1]])
+            energy[:, g.which] = np.einsum("ik,jikl,il->ji", v, G, v)
+        return energy
 
     @cached_property
     def _own_grams(self) -> list[np.ndarray]:
@@ -168,20 +182,19 @@ class Problem:
             chosen: The set.
             odds: Log odds of each candidate, or of all.
         """
-        if chosen not in self._most_feigned:
+        if chosen not in self._last:
             shares = np.array([c.effect.feigned**2 for c in self.candidates])
             rubs = np.array([c.effect.friction for c in self.candidates])
             by_friction, by_all = (self.explained(chosen, friction=f)[:, None] for f in (True, False))
             most = np.where(self.at_joint, shares * np.where(rubs, by_friction, by_all), 0.0)
-            self._most_feigned.clear()  # a search asks for the same set many times, and then for another
-            self._most_feigned[chosen] = most
-        most = self._most_feigned[chosen]
-        there = np.maximum(odds, 0.0) * self.parts
+            self._last.clear()  # a search asks for the same set many times, and then for another
+            self._last[chosen] = most, self.parts(chosen)
+        most, parts = self._last[chosen]
         alone = self.at_joint.sum(axis=0) == 1
-        return np.where(alone, most, np.minimum(most, there)).sum(axis=0)
+        return np.where(alone, most, np.minimum(most, np.maximum(odds, 0.0) * parts)).sum(axis=0)
 
     @cached_property
-    def _most_feigned(self) -> dict[tuple[int, ...], np.ndarray]:
+    def _last(self) -> dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]]:
         return {}
 
     def explained(self, chosen: tuple[int, ...], *, friction: bool = False) -> np.ndarray:
