@@ -137,6 +137,7 @@ def with_phi(robot: Robot, phi: Inertials) -> Robot:
     return eqx.tree_at(where, robot, (mass, com, inertia))
 
 
+@jax.jit  # as `_phi`
 def about_origin(point: Vec3) -> Float[Array, "10 10"]:
     """Matrix from inertial parameters about a point of a link, axes of its frame, to those about the frame's origin.
 
