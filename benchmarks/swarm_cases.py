@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax import identify, swarm
+from irb140_jax.compiler import QUICK
 from irb140_jax.dynamics import inverse_dynamics_batch
 from irb140_jax.recordings.excite import fourier_motion
 from irb140_jax.robot import Robot
@@ -38,7 +39,10 @@ def swarms(robot: Robot) -> dict[str, float]:
     ours["torque"] = lambda: swarm.minimise(torque, RULES["pso"], **box)
     first = {name: timing.seconds(case) for name, case in ours.items()}
     plain = lambda: swarm.minimise(distance, swarm.Pso(swarm.constant(W), C1, C2), **box).fitness  # noqa: E731
-    theirs = {"pyswarms": lambda: _pyswarms(reference, lower, upper), "evosax": _evosax(distance, lower, upper)}
+    theirs = {
+        "pyswarms": lambda: _pyswarms(reference, lower, upper), "evosax": _evosax(distance, lower, upper),
+        "bare": _bare(distance, lower, upper, {}), "bare_quick": _bare(distance, lower, upper, QUICK),
+    }  # fmt: skip
     first |= {name: timing.seconds(case) for name, case in theirs.items()}
     for name, result in {"ours": plain(), **{name: case() for name, case in theirs.items()}}.items():
         if not float(np.median(np.asarray(result))) < 0.1:  # 2.25 of random places in the box
@@ -52,6 +56,10 @@ def swarms(robot: Robot) -> dict[str, float]:
         "swarm_pyswarms_ratio": median["pyswarms"] / median["pso"],
         "swarm_evosax_ratio": median["evosax"] / median["pso"],
         "swarm_evosax_with_compile_ratio": first["evosax"] / first["pso"],
+        "swarm_bare_evosax_ratio": median["evosax"] / median["bare"],
+        "swarm_bare_evosax_with_compile_ratio": first["evosax"] / first["bare"],
+        "swarm_bare_quick_evosax_ratio": median["evosax"] / median["bare_quick"],
+        "swarm_bare_quick_evosax_with_compile_ratio": first["evosax"] / first["bare_quick"],
         "swarm_torque_over_distance": median["torque"] / median["pso"],
     }
 
@@ -107,3 +115,39 @@ def _evosax(distance, lower, upper):
     run = jax.jit(jax.vmap(one))
     keys = jax.random.split(jax.random.key(0), SEEDS)
     return lambda: run(keys)
+
+
+def _bare(distance, lower, upper, options):
+    """The least a swarm can be: equations 17 to 19 and nothing kept of the way, with cheaper random numbers than ours.
+
+    Bounds what compiling and running ours could come down to.
+    """
+
+    def hashed(x):
+        x = (x ^ (x >> 16)) * jnp.uint32(0x7FEB352D)
+        x = (x ^ (x >> 15)) * jnp.uint32(0x846CA68B)
+        return x ^ (x >> 16)
+
+    def uniforms(stream):
+        bits = hashed(jnp.arange(len(lower) * PARTICLES, dtype=jnp.uint32).reshape(-1, PARTICLES) + stream)
+        return jax.lax.bitcast_convert_type(bits, jnp.int32).astype(float) * 2.0**-32 + 0.5
+
+    def one(key, lower, upper):
+        def step(state, iteration):
+            x, v, best_x, best, leader, least = state
+            stream = hashed(key[0] + iteration * jnp.uint32(0x9E3779B9)) + key[1]
+            own, social = uniforms(stream), uniforms(hashed(stream))
+            v = W * v + C1 * own * (best_x - x) + C2 * social * (leader[:, None] - x)
+            x = jnp.clip(x + v, 0.0, 1.0)
+            f = jax.vmap(distance, (1, None))(lower[:, None] + (upper - lower)[:, None] * x, 1.0)
+            i, better = jnp.argmin(f), f < best
+            leader, least = jnp.where(f[i] < least, x[:, i], leader), jnp.minimum(f[i], least)
+            return (x, v, jnp.where(better, x, best_x), jnp.where(better, f, best), leader, least), least
+
+        x = uniforms(key[0] ^ key[1])
+        state = (x, jnp.zeros_like(x), x, jnp.full(PARTICLES, jnp.inf), x[:, 0], jnp.inf)
+        return jax.lax.scan(step, state, jnp.arange(ITERATIONS, dtype=jnp.uint32))[0][-1]
+
+    run = jax.jit(jax.vmap(one, (0, None, None)), compiler_options=options)
+    keys = jax.vmap(jax.random.key_data)(swarm.seed_keys(SEEDS))
+    return lambda: run(keys, lower, upper)
