@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 from tyro.conf import Positional, arg, subcommand
 
+from irb140_jax.allocator import keep_memory
 from irb140_jax.errors import InputError
 
 if TYPE_CHECKING:
@@ -208,6 +209,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         Exit code: 0 done, 2 the input can't be used (one line on stderr says why, nothing is written).
     """
+    if argv is None:  # the process is ours
+        keep_memory()
     try:
         command = _parsed(argv)
         from irb140_jax.compilation_cache import set_up_compilation_cache
