@@ -20,13 +20,13 @@ from typing import Literal
 import numpy as np
 import trials_report
 import tyro
+from unseen import unseen_errors
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.diagnose import DiagnoseConfig, Result
-from irb140_jax.mismatch.model import predict
+from irb140_jax.mismatch.diagnose import DiagnoseConfig
 from irb140_jax.recordings.conceal import ROUGH, ConcealedCase, Concealment, Noise, conceal, random_robot
 from irb140_jax.recordings.concealed.catalogue import HIDDEN
 from irb140_jax.recordings.concealed.choice import meaningful_sites
@@ -150,27 +150,16 @@ def judged(kind: Kind, seed: int) -> dict:
     result = diagnose(robot, recordings)
     seconds = time.monotonic() - start
     d = result.diagnosis
-    told = {e["effect"] for e in case.truth["effects"]} & set(CATALOGUE)
-    oracle = None
-    if kind == "single" and told:
-        oracle = diagnose(robot, recordings, DiagnoseConfig(effects=tuple(CATALOGUE[s] for s in told))).diagnosis
-        oracle = {"fit": oracle["fit"], "found": oracle["findings"]}
-    return {
+    record = {
         "seed": seed, "row": row, "joints_of_robot": robot.n, "truth": case.truth["effects"], "found": d["findings"],
-        "verdict": d["verdict"], "unexplained": d["unexplained"], "fit": d["fit"], "oracle": oracle,
-        "not_testable": d["not_testable"], "unseen": _unseen_error(result, case, noise), "seconds": seconds,
+        "verdict": d["verdict"], "unexplained": d["unexplained"], "fit": d["fit"], "oracle": None,
+        "not_testable": d["not_testable"], **unseen_errors(result.model, case, noise), "seconds": seconds,
     }  # fmt: skip
-
-
-def _unseen_error(result: Result, case: ConcealedCase, noise: Noise) -> dict[str, float]:
-    """Error of the corrected model on a recording that nothing saw, over the torque sensors' sigma, joint by joint."""
-    recording, log = case.recordings[-1], case.secret.logs[-1]
-    true = np.stack([np.interp(recording.t, log.t, x) for x in log.tau.T], axis=1)
-    sigma = noise.torque * np.array([case.secret.survey.rms(j) for j in range(true.shape[1])])
-    off = recording.tau - predict(result.model, recording)["corrected"]
-    sound = np.abs(recording.tau - true) < 6.0 * sigma  # without the spikes, which no model owes
-    error = np.sqrt(np.sum(np.where(sound, off, 0.0) ** 2, axis=0) / sound.sum(axis=0)) / sigma
-    return dict(zip(result.model.robot.joint_names, error.tolist(), strict=True))
+    told = {e["effect"] for e in case.truth["effects"]} & set(CATALOGUE)
+    if told and (kind == "single" or trials_report.missed(record)):
+        oracle = diagnose(robot, recordings, DiagnoseConfig(effects=tuple(CATALOGUE[s] for s in told))).diagnosis
+        record["oracle"] = {"fit": oracle["fit"], "found": oracle["findings"]}
+    return record
 
 
 def main() -> None:

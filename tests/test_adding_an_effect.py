@@ -43,7 +43,9 @@ def test_the_columns_of_the_skeleton_are_its_formula(extended):
     qd = np.random.default_rng(0).normal(size=(50, 3))
     q, none = jnp.zeros((50, 3)), jnp.zeros(0)
     rigid = RigidBody(*(none,) * 10)
-    motion = Motion(jnp.arange(50.0), q, jnp.asarray(qd), q, q, q, q, q, rigid, jnp.full(3, 1e-3), jnp.array(0.0))
+    rest = jnp.full(3, 1e-3)
+    direction = jnp.tanh(jnp.asarray(qd) / rest)
+    motion = Motion(jnp.arange(50.0), q, jnp.asarray(qd), q, q, q, q, q, rigid, rest, direction, jnp.array(0.0))
     law = extended["quadratic_drag"]
     w, shape = law.amplitudes({"drag": 1.7})
     torque = law.columns(motion, jnp.array([1]), jnp.asarray(shape)) @ w

@@ -13,6 +13,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.model import CorrectedModel, Named, predict
 from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.direction import direction_of
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 
@@ -135,6 +136,55 @@ def test_encoder_noise_above_the_motion_does_not_fill_the_acceleration():
     # White noise of density 2 sigma^2/rate through w^2 up to the band's end.
     in_band = 2e-5 * np.sqrt(2.0 / RATE * (2.0 * np.pi) ** 4 * BAND.position**5 / 5.0)
     assert error < 0.1 * in_band  # the motion ends at 0.3 Hz, the band far above
+
+
+def through(sign, step=0.005):
+    """The direction of these signs, 0 for unknown."""
+    speeds = np.asarray(sign, dtype=float)[:, None]
+    return direction_of(np.where(speeds == 0.0, 1e-9, speeds), np.array([1e-3]), 1.0 / step)[:, 0]
+
+
+def test_over_a_reversal_that_sticks_the_direction_runs_evenly_from_sign_to_sign():
+    d = through([-1.0] * 100 + [0.0] * 9 + [1.0] * 100)
+    assert d[:99] == pytest.approx(-1.0) and d[109:] == pytest.approx(1.0)
+    assert d[99:110] == pytest.approx(np.linspace(-1.0, 1.0, 11))
+
+
+def test_over_a_quick_reversal_the_direction_follows_the_speed():
+    speed = np.concatenate([-np.ones(100), [-9e-4, -3e-4, 3e-4, 9e-4], np.ones(100)])[:, None]
+    assert direction_of(speed, np.array([1e-3]), 200.0) == pytest.approx(np.tanh(speed / 1e-3), abs=1e-12)
+
+
+def test_a_joint_that_starts_has_run_up_to_its_friction_and_one_that_ends_at_rest_is_held():
+    d = through([0.0] * 100 + [1.0] * 100 + [0.0] * 10)
+    assert d[:81] == pytest.approx(0.0, abs=1e-5) and d[90] == pytest.approx(0.5)
+    assert d[110:] == pytest.approx(1.0)
+
+
+def test_after_a_long_rest_friction_is_not_known():
+    d = through([1.0] * 100 + [0.0] * 60)
+    assert d[100:] == pytest.approx(0.0, abs=1e-5)
+
+
+def test_a_joint_that_never_moves_has_no_direction():
+    assert through([0.0] * 200) == pytest.approx(0.0, abs=1e-5)
+
+
+def test_torque_where_a_joint_sticks_comes_nearer_than_by_the_speed_alone():
+    """A mass on dry friction, dragged by a stiff spring: what the spring gives is the torque."""
+    dt, t = 1e-4, np.arange(0.0, 8.0, 1e-4)
+    mass, friction, spring, damper = 1.0, 10.0, 1e3, 60.0
+    goal, goal_speed, _ = wave(t, 0.25)
+    q, torque, x, v = np.empty_like(t), np.empty_like(t), 0.0, 0.0
+    for i in range(len(t)):
+        q[i], torque[i] = x, spring * (goal[i] - x) + damper * (goal_speed[i] - v)
+        free = v + dt * torque[i] / mass
+        v = np.sign(free) * max(abs(free) - dt * friction / mass, 0.0)  # rests if friction can take all of it
+        x += dt * v
+    every, step = slice(None, None, 20), 2e-5
+    r = condition(logged(t[every], step * np.round(q[every] / step), torque[every]), BAND)
+    error = lambda d: np.sqrt(np.mean((mass * r.qdd + friction * d - np.interp(r.t, t, torque)[:, None]) ** 2))  # noqa: E731
+    assert error(r.direction) < 0.8 * error(np.tanh(r.qd / r.rest_speed))
 
 
 def test_a_joint_at_rest_does_not_count_and_a_moving_one_does():

@@ -1,5 +1,7 @@
 """A wall felt by an arm that moves in a plane: what of it is known, and what is not."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -83,3 +85,18 @@ def test_walls_that_are_alike_push_alike(seed):
         assert np.linalg.norm(shape[:3]) == pytest.approx(1.0)
         other = stiffness * _wall(left.tool, left.tool_jacobian, np.array(shape), np)
         np.testing.assert_allclose(other, pushed, atol=1e-9 * np.abs(pushed).max())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_forces_that_are_alike_move_no_joint_otherwise_and_only_where_there_are_such(seed):
+    push, shape = CATALOGUE["external_wrench"], np.array([1.0, 3.0, 1.0])
+    force = np.random.default_rng(seed).normal(size=3)
+    left, _ = left_over(seed, np.array([0.0, 1.0, 0.0]))
+    alike = push.alike(left, force, shape)
+    np.testing.assert_allclose(alike[:, :3], [shape, shape])
+    # As strong as the push, either way, across the plane.
+    expected = np.linalg.norm(force) * np.array([ACROSS, -ACROSS])
+    np.testing.assert_allclose(sorted((alike[:, 3:] - force).tolist()), sorted(expected.tolist()), atol=1e-9)
+    np.testing.assert_allclose(left.tool_jacobian @ (alike[0, 3:] - force), 0.0, atol=1e-9)
+    turned = dataclasses.replace(left, tool_jacobian=left.tool_jacobian + np.outer(np.sin(left.t), ACROSS)[:, None])
+    assert push.alike(turned, force, shape).shape == (0, 6)

@@ -29,7 +29,7 @@ class AsymmetricFriction(AbstractEffect):
     not_in_mjcf = "at rest the difference of the two directions stays on, as a constant torque"
 
     def columns(self, motion, joints, shape):
-        s = of_site(motion.direction(), joints)
+        s = of_site(motion.direction, joints)
         return jnp.stack([jnp.maximum(s, 0.0), jnp.minimum(s, 0.0)], axis=-1)
 
     def physical(self, w, shape):

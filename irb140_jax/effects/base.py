@@ -58,6 +58,7 @@ class Motion(eqx.Module):
         total_rate: Time derivative of the total torque, shape (T, n).
         rigid: What the rigid body does along the motion.
         rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
+        direction: sign(qd), and between two signs what friction does while a joint sticks, shape (T, n).
         recording: Number of the recording, from 0; below 0 for motion that the diagnosis did not see, shape ().
     """
 
@@ -71,11 +72,8 @@ class Motion(eqx.Module):
     total_rate: JointSamples
     rigid: "RigidBody"
     rest_speed: Joints
+    direction: JointSamples
     recording: Scalar
-
-    def direction(self) -> JointSamples:
-        """sign(qd), rounded off where encoder noise hides the sign, shape (T, n)."""
-        return jnp.tanh(self.qd / self.rest_speed)
 
 
 class Scales(NamedTuple):

@@ -30,7 +30,7 @@ class CoulombFriction(AbstractEffect):
     not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):
-        return of_site(motion.direction(), joints)[:, :, None]
+        return of_site(motion.direction, joints)[:, :, None]
 
     def physical(self, w, shape):
         return w
@@ -51,4 +51,4 @@ class CoulombFriction(AbstractEffect):
 
 def dry_friction_columns(motion, joints, second):
     """Columns [sign(qd), second], the shape shared by friction laws that refine Coulomb's, (T, m, 2)."""
-    return jnp.stack([of_site(motion.direction(), joints), second], axis=-1)
+    return jnp.stack([of_site(motion.direction, joints), second], axis=-1)

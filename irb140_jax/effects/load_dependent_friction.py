@@ -31,7 +31,7 @@ class LoadDependentFriction(AbstractEffect):
 
     def columns(self, motion, joints, shape):
         load = jnp.abs(of_site(motion.load, joints))
-        return dry_friction_columns(motion, joints, load * of_site(motion.direction(), joints))
+        return dry_friction_columns(motion, joints, load * of_site(motion.direction, joints))
 
     def physical(self, w, shape):
         return jnp.stack([w[1], w[0]])

@@ -38,7 +38,7 @@ class NonlinearViscousFriction(AbstractEffect):
         # Powers of |qd| have no slope at rest: the rounded sign keeps them smooth.
         qd = of_site(motion.qd, joints)
         size = jnp.sqrt(qd**2 + 1e-4 * jnp.take(motion.rest_speed, joints) ** 2)
-        return (size ** shape[0] * of_site(motion.direction(), joints))[:, :, None]
+        return (size ** shape[0] * of_site(motion.direction, joints))[:, :, None]
 
     def physical(self, w, shape):
         return jnp.stack([w[0], shape[0]])

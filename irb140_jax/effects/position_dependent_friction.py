@@ -56,7 +56,7 @@ class PositionDependentFriction(AbstractEffect):
 
     def columns(self, motion, joints, shape):
         bump = jnp.exp(-(((of_site(motion.q, joints) - shape[0]) / shape[1]) ** 2))
-        return dry_friction_columns(motion, joints, bump * of_site(motion.direction(), joints))
+        return dry_friction_columns(motion, joints, bump * of_site(motion.direction, joints))
 
     def physical(self, w, shape):
         return jnp.stack([w[0], w[1] / jnp.where(w[0] == 0.0, 1.0, w[0]), shape[0], shape[1]])

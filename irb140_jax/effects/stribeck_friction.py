@@ -41,7 +41,7 @@ class StribeckFriction(AbstractEffect):
         return True
 
     def columns(self, motion, joints, shape):
-        s = of_site(motion.direction(), joints)
+        s = of_site(motion.direction, joints)
         return dry_friction_columns(motion, joints, jnp.exp(-((of_site(motion.qd, joints) / shape[0]) ** 2)) * s)
 
     def physical(self, w, shape):

@@ -158,9 +158,9 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
     load, total, carried = loads or (along.nominal, along.nominal, along.nominal - along.motor_side)
     dt = float(np.mean(np.diff(r.t)))
     rate = np.gradient(total, dt, axis=0)
-    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, rate)
+    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, rate, along.rigid, r.rest_speed, r.direction)
     which = np.array(float(recording))
-    whole = Motion(*moving, along.rigid, r.rest_speed, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
+    whole = Motion(*moving, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
     per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)
     sites, shapes = [b[1] for b in lib.blocks], [b[2] for b in lib.blocks]
     out = np.empty((len(r.t), len(lib.entries[0])))
@@ -193,7 +193,7 @@ def _columns(effects, motion, sites, shapes):
 
 def _friction(robot: Robot, r: Conditioned) -> np.ndarray:
     """The model's own friction, with the sign of qd rounded off as in the candidates."""
-    return np.asarray(robot.damping) * r.qd + np.asarray(robot.frictionloss) * np.tanh(r.qd / r.rest_speed)
+    return np.asarray(robot.damping) * r.qd + np.asarray(robot.frictionloss) * r.direction
 
 
 @dataclasses.dataclass(frozen=True)

@@ -213,13 +213,15 @@ def _torque(
     dt = jnp.mean(jnp.diff(t)) if len(t) > 1 else 1.0
     rate = lambda x: jnp.asarray(jnp.gradient(x, dt, axis=0)) if len(t) > 1 else jnp.zeros_like(x)  # noqa: E731
     since = t - t[0] if len(t) > 1 else t
+    direction = jnp.tanh(qd / robot.rest_speed)
     sensed = Sensitivities(robot.robot, robot.ahead, q, qd, qdd)
 
     def summed(_, torques):
         load, carried, total, _ = torques
         rigid = cast(RigidBody, sensed)  # it has the same names, and derives what is asked for
         new = jnp.array(-1.0)  # no recording of the diagnosis
-        motion = Motion(since, q, qd, qdd, load, total, carried, rate(total), rigid, robot.rest_speed, new)
+        moving = (since, q, qd, qdd, load, total, carried, rate(total), rigid, robot.rest_speed, direction)
+        motion = Motion(*moving, new)
         return robot.summed(motion, base, stepped)
 
     # Twice, as in the fit: columns that depend on the load see the corrected one the second time.

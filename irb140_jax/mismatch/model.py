@@ -14,7 +14,7 @@ from irb140_jax.errors import InputError
 from irb140_jax.mismatch.along import Columns, Loads, columns_along, prepared, seen_by
 from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.recordings.condition import Conditioned, condition
-from irb140_jax.recordings.low_pass import Band
+from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot, with_phi
 
@@ -107,8 +107,8 @@ class CorrectedModel:
 def composed(
     lib: Library,
     along: Columns,
-    candidates: list[Candidate],
-    amplitudes: list[np.ndarray],
+    candidates: Sequence[Candidate],
+    amplitudes: Sequence[np.ndarray],
     dphi_refit: np.ndarray,
     dphi_corrected: np.ndarray,
 ) -> Torques:
@@ -137,8 +137,8 @@ def composed(
     return Torques(nominal, nominal + Y @ dphi_refit, load, load - inside, total, total + logged)
 
 
-def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
-    """The model's torques along a conditioned recording, on its grid."""
+def library_of(model: CorrectedModel) -> Library:
+    """A library of nothing but what the model names, in its order."""
     blocks, candidates, first = [], [], 0
     for named in model.named:
         width = max(max(v) for v in named.effect.variants) + 1
@@ -148,21 +148,29 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
                       np.full(len(named.variant), -np.inf), np.full(len(named.variant), np.inf))
         )  # fmt: skip
         first += width
-    lib = Library(model.robot, tuple(candidates), tuple(blocks), first)
+    return Library(model.robot, tuple(candidates), tuple(blocks), first)
+
+
+def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
+    """The model's torques along a conditioned recording, on its grid."""
+    lib = library_of(model)
     nominal_phi = np.asarray(model.robot.phi)
     shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
     amplitudes = [named.amplitudes for named in model.named]
     along = seen_by(better_known(model.robot, model.phi_corrected, model.named), prepared(model.robot, recording))
-    torques = composed(lib, columns_along(lib, along), candidates, amplitudes, *shifts)
+    torques = composed(lib, columns_along(lib, along), lib.candidates, amplitudes, *shifts)
     if not model.named:
         return torques
     # Columns that depend on the load see the corrected one, as they did in the fit.
     loads = Loads(torques.load, torques.total, torques.carried)
-    return composed(lib, columns_along(lib, along, loads), candidates, amplitudes, *shifts)
+    return composed(lib, columns_along(lib, along, loads), lib.candidates, amplitudes, *shifts)
 
 
 def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray]:
     """Torques of the diagnosed models along a new recording, one row a row of its file.
+
+    They hold no frequencies above those of the smoothed positions.  Where friction jumps, so does the acceleration, and
+    the torque does not: a sharp jump beside a rounded one would leave their difference.
 
     Returns:
         "nominal", "refit" and "corrected", each (rows, n) [N m or N], at the times `prediction_times`.
@@ -178,8 +186,9 @@ def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray
     smooth = condition(recording, model.band, pad=True)
     torques = torques_along(model, smooth)
     t, out = prediction_times(recording), {}
+    taps = kernels(model.band.position, model.band.rate)[0]
     for name in ("nominal", "refit", "corrected"):
-        values = getattr(torques, name)
+        values = filtered(getattr(torques, name), taps, odd=False)
         out[name] = np.stack([np.interp(t, smooth.t, values[:, j]) for j in range(values.shape[1])], axis=1)
     return out
 

@@ -97,9 +97,9 @@ def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
     rounded = np.abs(motion.qd) < ROUNDED * rest_speed
     around = 2 * int(np.ceil(LEAK / (motion.t[1] - motion.t[0]))) + 1
     usable = ~ndimage.maximum_filter1d(rounded.astype(np.uint8), around, axis=0).astype(bool)
-    return Conditioned(
-        motion.name, motion.t, motion.q, motion.qd, motion.qdd, np.zeros_like(motion.q), usable, rest_speed, ()
-    )
+    direction, torque = np.tanh(motion.qd / rest_speed), np.zeros_like(motion.q)
+    moving = (motion.name, motion.t, motion.q, motion.qd, motion.qdd, torque, usable)
+    return Conditioned(*moving, rest_speed, direction, ())
 
 
 def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, int]]:

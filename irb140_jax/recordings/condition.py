@@ -12,6 +12,7 @@ import numpy as np
 from scipy import interpolate, ndimage
 
 from irb140_jax import dynamics
+from irb140_jax.recordings.direction import REST, direction_of
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.smooth import noise_density, signal_limit, white_density, without_noise
@@ -22,7 +23,6 @@ MIN_TORQUE_BAND = 4.0  # Hz; friction reversals are steps, a narrower band would
 WORKING_RATE = 200.0  # Hz; columns are evaluated at least this often
 SLOW = 3.0  # Hz; below, model and log may differ by the very friction that is looked for
 INCOHERENT = 0.05  # share of the model's torque that may be noise: what biases parameters by as much
-REST = 0.1  # s that a joint must stay where it is to rest: a reversal takes less
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,6 +36,7 @@ class Conditioned:
         tau: Logged torque without spikes, anti-aliased to the grid [N m or N], shape (T, n).
         usable: False where a joint rests (dry friction is undetermined there) or samples are missing, shape (T, n).
         rest_speed: Speed that encoder noise can't tell from rest, shape (n,).
+        direction: sign(qd), and what stands for it near rest (see `direction_of`), shape (T, n).
         notes: Repairs, as sentences.
         began: Time of the log's first row [s]; the smoother leaves out the first samples.
     """
@@ -48,6 +49,7 @@ class Conditioned:
     tau: np.ndarray
     usable: np.ndarray
     rest_speed: np.ndarray
+    direction: np.ndarray
     notes: tuple[str, ...]
     began: float = 0.0
 
@@ -96,14 +98,13 @@ def _coherent_limit(smooth: list["Conditioned"], robot: Robot, band: Band) -> fl
     moving = eqx.tree_at(passive, robot, (jnp.zeros(robot.n),) * 3)
     for r in smooth:
         m = np.asarray(dynamics.inverse_dynamics_batch(moving, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
-        direction = np.tanh(r.qd / r.rest_speed)
-        friction = np.concatenate([direction, r.qd], axis=1)
+        friction = np.concatenate([r.direction, r.qd], axis=1)
         slow = filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), kernels(SLOW, band.rate)[0], odd=False)
         for j in range(robot.n):
             inputs = np.concatenate([slow[:, [robot.n + j, 2 * robot.n + j]], slow[:, 3 * robot.n :]], axis=1)
             inputs = np.concatenate([inputs, np.ones((len(inputs), 1))], axis=1)
             w = np.linalg.lstsq(inputs, slow[:, j], rcond=1e-6)[0]
-            x = np.stack([m[:, j], r.tau[:, j] - friction @ w[2:-1], direction[:, j], r.tau[:, j]], axis=1)
+            x = np.stack([m[:, j], r.tau[:, j] - friction @ w[2:-1], r.direction[:, j], r.tau[:, j]], axis=1)
             for start in range(0, len(x) - window + 1, window // 2):
                 piece = x[start : start + window]
                 F = np.fft.rfft((piece - piece.mean(axis=0)) * taper, axis=0)
@@ -152,6 +153,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     grid = np.arange(t[keep][0], t[keep][-1] + 1e-9, 1.0 / band.rate)
     q, qd, qdd, tau = (_at(grid, t, x) for x in (*smoothed, tau))
     rest_speed = np.maximum(np.maximum(3.0 * speed_noise, 0.003 * np.abs(qd).max(axis=0, initial=0.0)), 1e-6)
+    direction = direction_of(qd, rest_speed, band.rate)
     slow = ndimage.minimum_filter1d((np.abs(qd) < rest_speed).astype(float), int(REST * band.rate) | 1, axis=0)
     stuck = _at(grid, recording.t, _within_a_step(recording).astype(float))
     resting = ndimage.maximum_filter1d(np.maximum(slow, stuck), int(2 * REST * band.rate) | 1, axis=0) > 0.5
@@ -162,7 +164,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     if spikes:
         notes.append(f"{spikes} torque spikes were replaced by the median of their neighbours")
     usable, began = ~resting & ~lost[:, None], float(recording.t[0])
-    return Conditioned(recording.source, grid, q, qd, qdd, tau, usable, rest_speed, tuple(notes), began)
+    return Conditioned(recording.source, grid, q, qd, qdd, tau, usable, rest_speed, direction, tuple(notes), began)
 
 
 def _within_a_step(recording: Recording) -> np.ndarray:
