@@ -134,10 +134,17 @@ def _exchange(
     for drop in [*((c,) for c in near), *pairs]:
         rest = tuple(c for c in chosen if c not in drop)
         old = [problem.candidates[c] for c in drop]
-        scores = problem.scores(rest, {j for c in old for j in c.joints}) - problem.odds(rest, drop)
+        own, already = problem.scores(rest, {j for c in old for j in c.joints}), problem.odds(rest, drop)
+        scores = own - already
         scores[conflicts(problem, rest)] = -np.inf
         scores[[*drop, *banned]] = -np.inf
+        if not (scores > best).any():
+            continue
         hurdle = problem.feigned(chosen, scores)
+        if len(drop) == 1 and not old[0].effect.friction:
+            # What goes feigns nothing any more, and had to take such a hurdle itself.
+            lower = np.maximum(problem.feigned(rest, own) - problem.feigned(rest, already)[drop[0]], 0.0)
+            hurdle = np.where([c.effect.friction for c in problem.candidates], hurdle, lower)
         for i in np.flatnonzero(scores > best):
             c = problem.candidates[i]
             if len(drop) == 1 and c.slug in old[0].effect.contains:
