@@ -2,31 +2,10 @@
 
 import numpy as np
 import pytest
+from helpers_problem import ROWS, TURNS, WAVE, problem
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.problem import LEAST_SHARE, Problem
-
-ROWS = 80
-RNG = np.random.default_rng(0)
-TURNS, WAVE = np.sign(RNG.normal(size=ROWS)), RNG.normal(size=ROWS)
-WAVE -= TURNS * (TURNS @ WAVE) / ROWS
-
-
-def problem(members, y, recordings: int = 1) -> Problem:
-    """Of candidates (slug, joints, torque per unit at each joint) for the torque y, each of shape (n, ROWS)."""
-    X = np.stack([np.asarray(torque, dtype=float) for _, _, torque in members] + [y], axis=-1)
-    per_joint = np.einsum("jtk,jtl->jkl", X, X)
-    limit, none = np.full((len(members), 1), np.inf), np.zeros(len(members))
-    candidates = tuple(
-        Candidate(CATALOGUE[slug], joints, np.zeros(0), np.array([k]), (0,), -limit[k], limit[k])
-        for k, (slug, joints, _) in enumerate(members)
-    )
-    energy = np.tile(np.maximum(np.sum(np.square(y), axis=1) / recordings, 1e-300), (recordings, 1))
-    return Problem(
-        per_joint.sum(axis=0), per_joint, energy, candidates, 0, none, none, -limit, limit,
-        np.zeros((len(members), 1)), -limit[:, 0],
-    )  # fmt: skip
+from irb140_jax.mismatch.problem import LEAST_SHARE
 
 
 def explained_by_friction(level: float) -> float:

@@ -1,0 +1,37 @@
+"""Moves of the search for names: what stands in the place of what, and what it has to overcome."""
+
+import numpy as np
+import pytest
+from helpers_problem import ROWS, TURNS, WAVE, problem
+
+from irb140_jax.mismatch.name import PREFER, _exchange
+
+NEAR = WAVE + 0.6 * np.random.default_rng(7).normal(size=ROWS)  # explains most of what WAVE explains
+FRICTION = ("coulomb_friction", (0,), [TURNS])
+SPRING, GAIN = ("gravity_spring", (0,), [WAVE]), ("torque_gain", (0,), [NEAR])
+
+
+def exchanged(other, size: float):
+    """Whether `other`, with a parameter more, takes the place of a gain beside strong friction; odds and hurdle."""
+    y = (50.0 * TURNS + size * WAVE)[None]
+    there = problem([FRICTION, GAIN, other], y, shapes=(2,))
+    more = there.odds((0,), (2,)) - there.odds((0,), (1,))
+    hurdle = there.feigned((0, 1), more)[2]
+    return _exchange(there, (0, 1), (0, 1), frozenset()) == (0, 2), more, hurdle
+
+
+def test_a_law_takes_the_place_of_another_that_had_the_same_to_overcome():
+    done, more, hurdle = exchanged(SPRING, 1.5)
+    assert PREFER < more < hurdle  # of friction that both of them could stand for
+    assert done
+
+
+@pytest.mark.parametrize("size", [0.05, 0.1])
+def test_more_parameters_must_be_clearly_better(size):
+    done, more, _ = exchanged(SPRING, size)
+    assert more < PREFER and not done
+
+
+def test_friction_has_all_of_it_to_overcome():
+    done, more, hurdle = exchanged(("stribeck_friction", (0,), [WAVE]), 1.5)
+    assert PREFER < more < hurdle and not done
