@@ -1,7 +1,7 @@
 """How a process of its own, such as the command line's, gets and keeps memory.
 
 A diagnosis makes and drops arrays of megabytes all the time.  glibc asks the system for each anew and gives it back
-when it is dropped, and the system clears every page on its first use: a third of the processor time of a diagnosis.
+when it is dropped, and the system clears every page on its first use: a quarter of the processor time of a diagnosis.
 Kept in one heap, the memory is used again; its peak falls too, as nothing lies idle in the heaps of other threads.
 """
 
