@@ -5,6 +5,7 @@ import dataclasses
 import io
 import json
 import math
+import os
 import pathlib
 import re
 import sys
@@ -222,6 +223,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130  # what a shell makes of an interrupted program
+    except BrokenPipeError:  # whoever read our words has stopped, as in `irb140 --help | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python would flush into the pipe at its end
+        return 141
     return 0
 
 
