@@ -12,6 +12,7 @@ from irb140_jax.compiler import QUICK
 from irb140_jax.dynamics import inverse_dynamics_batch
 from irb140_jax.recordings.excite import fourier_motion
 from irb140_jax.robot import Robot
+from irb140_jax.swarm.draws import mixed
 from irb140_jax.trajectory import Trajectory
 
 SEEDS, PARTICLES, ITERATIONS = 30, 120, 150
@@ -48,6 +49,7 @@ def swarms(robot: Robot) -> dict[str, float]:
         if not float(np.median(np.asarray(result))) < 0.1:  # 2.25 of random places in the box
             raise AssertionError(f"the swarm of {name} found nothing: {np.median(np.asarray(result)):.3g}")
     median = timing.medians(ours | theirs, ROUNDS)
+    stages = timing.stages(lambda keys: swarm.minimise(distance, RULES["pso"], **box | {"keys": keys}), box["keys"])
     return {
         "swarms_run_s": median["pso"] + median["qpso"],
         "swarms_with_compile_s": first["pso"] + first["qpso"],
@@ -61,6 +63,8 @@ def swarms(robot: Robot) -> dict[str, float]:
         "swarm_bare_quick_evosax_ratio": median["evosax"] / median["bare_quick"],
         "swarm_bare_quick_evosax_with_compile_ratio": first["evosax"] / first["bare_quick"],
         "swarm_torque_over_distance": median["torque"] / median["pso"],
+        "swarm_pso_fifth_of_evosax_s": first["evosax"] / 5.0,
+        **{f"swarm_pso_{stage}_s": seconds for stage, seconds in stages.items()},
     }
 
 
@@ -123,20 +127,15 @@ def _bare(distance, lower, upper, options):
     Bounds what compiling and running ours could come down to.
     """
 
-    def hashed(x):
-        x = (x ^ (x >> 16)) * jnp.uint32(0x7FEB352D)
-        x = (x ^ (x >> 15)) * jnp.uint32(0x846CA68B)
-        return x ^ (x >> 16)
-
     def uniforms(stream):
-        bits = hashed(jnp.arange(len(lower) * PARTICLES, dtype=jnp.uint32).reshape(-1, PARTICLES) + stream)
+        bits = mixed(jnp.arange(len(lower) * PARTICLES, dtype=jnp.uint32).reshape(-1, PARTICLES) + stream)
         return jax.lax.bitcast_convert_type(bits, jnp.int32).astype(float) * 2.0**-32 + 0.5
 
     def one(key, lower, upper):
         def step(state, iteration):
             x, v, best_x, best, leader, least = state
-            stream = hashed(key[0] + iteration * jnp.uint32(0x9E3779B9)) + key[1]
-            own, social = uniforms(stream), uniforms(hashed(stream))
+            stream = mixed(key[0] + iteration * jnp.uint32(0x9E3779B9)) + key[1]
+            own, social = uniforms(stream), uniforms(mixed(stream))
             v = W * v + C1 * own * (best_x - x) + C2 * social * (leader[:, None] - x)
             x = jnp.clip(x + v, 0.0, 1.0)
             f = jax.vmap(distance, (1, None))(lower[:, None] + (upper - lower)[:, None] * x, 1.0)

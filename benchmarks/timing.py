@@ -36,6 +36,18 @@ def compile_seconds(case: Case) -> float:
     return first - seconds(case)
 
 
+def stages(function: Case, *arguments: Any) -> dict[str, float]:
+    """Processor time of tracing, lowering and compiling a function [s]; forgets all that is compiled before it."""
+    jax.clear_caches()
+    start = time.process_time()
+    traced = jax.jit(function).trace(*arguments)
+    tracing = time.process_time()
+    lowered = traced.lower()
+    lowering = time.process_time()
+    lowered.compile()
+    return {"trace": tracing - start, "lower": lowering - tracing, "compile": time.process_time() - lowering}
+
+
 def medians(cases: Mapping[str, Case], rounds: int, repeats: int = 1) -> dict[str, float]:
     """Median time of a call of each case [s]; every round runs all cases, so that drift hits them alike."""
     times: dict[str, list[float]] = {name: [] for name in cases}

@@ -48,9 +48,9 @@ def _hashed(words: UInt32[Array, "2"], iteration: Array, slot: int, shape: tuple
     The first word of the stream offsets the counter, the second enters between the rounds, so that two streams which
     meet in one word still differ.
     """
-    a = _mixed(words[0] + jnp.uint32(_WEYL) * iteration.astype(jnp.uint32))
-    b = _mixed(words[1] ^ _mixed(a + jnp.uint32(slot)))
-    x = _counter(shape) * jnp.uint32(_WEYL) + _mixed(a ^ b)
+    a = mixed(words[0] + jnp.uint32(_WEYL) * iteration.astype(jnp.uint32))
+    b = mixed(words[1] ^ mixed(a + jnp.uint32(slot)))
+    x = _counter(shape) * jnp.uint32(_WEYL) + mixed(a ^ b)
     x = (x ^ (x >> 16)) * jnp.uint32(0x7FEB352D) ^ b
     x = (x ^ (x >> 15)) * jnp.uint32(0x846CA68B)
     x = x ^ (x >> 16)
@@ -67,7 +67,7 @@ def _counter(shape: tuple[int, ...]) -> UInt32[Array, "..."]:
     return count
 
 
-def _mixed(x: Array) -> Array:
+def mixed(x: Array) -> Array:
     """Finaliser of 32-bit words in which every bit in changes half of the bits out.
 
     Source: Wellons (2018), Prospecting for hash functions: two multiply-xorshift rounds of low bias.

@@ -48,9 +48,9 @@ class NoiseResilientQpso(Rule):
         pbest = jnp.where(better, swarm.position, swarm.pbest)
         pbest_fitness = jnp.where(better, fitness, jnp.where(again, mean, swarm.pbest_fitness))
         count = jnp.where(better, 1.0, count + again)
-        i = jnp.argmin(pbest_fitness)
-        improved = pbest_fitness[i] < swarm.gbest_fitness
+        i, least = jnp.argmin(pbest_fitness), jnp.min(pbest_fitness)
+        improved = least < swarm.gbest_fitness
         return swarm.with_(
-            pbest=pbest, pbest_fitness=pbest_fitness, gbest=pbest[:, i], gbest_fitness=pbest_fitness[i],
+            pbest=pbest, pbest_fitness=pbest_fitness, gbest=pbest[:, i], gbest_fitness=least,
             solution=pbest[:, i], stalled=jnp.where(improved, 0, swarm.stalled + 1), memory=(count, again),
         )  # fmt: skip
