@@ -184,6 +184,7 @@ MEASURES: dict[str, dict[str, Callable[[list[dict]], str]]] = {
         "findings that are not there, per case": lambda cs: f"{np.mean([_not_there(c) for c in cs]):.2f}",
         "corrected error over the sensors' noise, median": lambda cs: _median(_over_noise(c, "unseen") for c in cs),
         "the same, of these laws with any parameters": lambda cs: _median(_over_noise(c, "unseen_limit") for c in cs),
+        "the same, given positions without any noise": lambda cs: _median(_over_noise(c, "unseen_exact") for c in cs),
     },
     "several": {
         "every one named": lambda cs: _percent(not missed(c) for c in cs),

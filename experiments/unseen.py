@@ -1,5 +1,7 @@
 """How near a corrected model comes to the torque of a recording that nothing saw, and how near its laws could come."""
 
+import dataclasses
+
 import numpy as np
 
 from irb140_jax.mismatch.along import Loads, columns_along, prepared, seen_by
@@ -14,8 +16,9 @@ def unseen_errors(model: CorrectedModel, case: ConcealedCase, noise: Noise) -> d
 
     Returns:
         "unseen": of the model.  "unseen_limit": of the same laws and shapes, with the inertials and amplitudes that fit
-        this very recording's torque best, joint by joint and without its noise: what no parameters could better,
-        because the encoders do not show the motion.
+        this very recording's torque best, joint by joint and without its noise: what no parameters could better.
+        "unseen_exact": of the model again, given the positions without the encoders' noise and rounding: what no
+        better smoother of positions could better.
     """
     recording, log = case.recordings[-1], case.secret.logs[-1]
     true = np.stack([np.interp(recording.t, log.t, x) for x in log.tau.T], axis=1)
@@ -27,6 +30,7 @@ def unseen_errors(model: CorrectedModel, case: ConcealedCase, noise: Noise) -> d
         rms = np.sqrt(np.sum(off**2, axis=0) / sound.sum(axis=0)) / sigma
         return dict(zip(model.robot.joint_names, rms.tolist(), strict=True))
 
+    exact = dataclasses.replace(recording, q=np.stack([np.interp(recording.t, log.t, x) for x in log.q.T], axis=1))
     columns, grid = _columns(model, case)
     at_grid = np.stack([np.interp(grid, recording.t, x) for x in true.T], axis=1)
     best = np.empty_like(at_grid)
@@ -34,7 +38,11 @@ def unseen_errors(model: CorrectedModel, case: ConcealedCase, noise: Noise) -> d
         A = columns[:, j]
         best[:, j] = A @ np.linalg.lstsq(A, at_grid[:, j], rcond=1e-9)[0]
     best = np.stack([np.interp(recording.t, grid, x) for x in best.T], axis=1)
-    return {"unseen": error(predict(model, recording)["corrected"]), "unseen_limit": error(best)}
+    return {
+        "unseen": error(predict(model, recording)["corrected"]),
+        "unseen_limit": error(best),
+        "unseen_exact": error(predict(model, exact)["corrected"]),
+    }
 
 
 def _columns(model: CorrectedModel, case: ConcealedCase) -> tuple[np.ndarray, np.ndarray]:

@@ -105,6 +105,23 @@ def test_posterior_is_that_of_dense_bayesian_regression(seed):
     np.testing.assert_allclose(W @ post.cov @ W, W @ W - gain @ X @ W @ W, atol=1e-9)
 
 
+def test_a_strong_effect_keeps_what_the_inertials_could_take_and_a_weak_one_does_not():
+    # Effect and inertial parameter move the torque alike; y is what `true` of the effect would make, noise-free.
+    x = np.full(100, 10.0)
+
+    def found(true):
+        A = np.stack([x, x, true * x], axis=1)
+        return [posterior(A.T @ A, np.arange(2), named) for named in ((), [slice(1, 2)])]
+
+    plain, widened = found(20.0)
+    np.testing.assert_allclose(plain.mean, 10.0, rtol=1e-3)
+    np.testing.assert_allclose(widened.mean, [0.05, 19.95], atol=2e-3)  # a ratio of prior variances of 20^2
+    assert widened.cov[1, 1] == pytest.approx(1.0, rel=0.01)  # as little as the inertial parameter is known
+    plain, widened = found(0.8)
+    np.testing.assert_array_equal(plain.mean, widened.mean)
+    np.testing.assert_array_equal(plain.cov, widened.cov)
+
+
 def test_amplitudes_of_the_gains_are_those_of_the_posterior():
     G = grams(stretches(5), a_noise(5), np.ones(NUISANCES + AMPLITUDES), NUISANCES, blocks=4).total()
     _, mean = gains(eliminated(G, np.arange(NUISANCES))[0], layouts(candidates(), NUISANCES), len(SETS), 2)

@@ -20,6 +20,7 @@ from irb140_jax.mismatch.along import Stretch
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.noise import Noise
 
+WIDENINGS = 10  # rounds in which the priors of strong effects become as wide as those; three or four are usual
 ROUNDING = 1e-12  # relative; a log of nonsense can make columns that are equal to a dozen digits
 
 
@@ -115,11 +116,30 @@ class Posterior:
     cov: np.ndarray
 
 
-def posterior(H: np.ndarray, columns: np.ndarray) -> Posterior:
-    """Posterior of the given columns (unit prior) from a Gram matrix whose last column is y."""
-    M = with_prior(H[np.ix_(columns, columns)])
-    cov = linalg.cho_solve(linalg.cho_factor(M), np.eye(len(columns)))
-    return Posterior(columns, cov @ H[columns, -1], cov)
+def posterior(H: np.ndarray, columns: np.ndarray, named: Sequence[slice] = ()) -> Posterior:
+    """Posterior of the given columns from a Gram matrix whose last column is y.
+
+    The prior is a unit one, which says what was to be expected before anything was found; but a named effect that comes
+    out larger gets one as wide as its largest amplitude.  Otherwise what it shares with the inertials would be theirs:
+    a payload of twenty times the expected one would lose most of its mass to the links.
+
+    Args:
+        H: The Gram matrix, in prior units.
+        columns: Which of its columns.
+        named: Amplitudes of each named effect, among `columns`.
+    """
+    G, b = H[np.ix_(columns, columns)], H[columns, -1]
+    width = np.ones(len(columns))
+    for _ in range(WIDENINGS):
+        wide = width[:, None] * width
+        cov = wide * linalg.cho_solve(linalg.cho_factor(with_prior(wide * G)), np.eye(len(columns)))
+        mean = cov @ b
+        last, width = width, np.ones(len(columns))
+        for part in named:
+            width[part] = max(1.0, float(np.max(np.abs(mean[part]))))
+        if np.allclose(width, last, rtol=0.01):
+            break
+    return Posterior(columns, mean, cov)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -130,7 +130,11 @@ def withdrawn(ex: Explanation, names: Collection[int]) -> Explanation:
 def full_posterior(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without=None) -> Posterior:
     """Posterior of inertials and chosen amplitudes, in prior units."""
     columns = np.concatenate([np.arange(data.nuisances), prob.columns(chosen)])
-    post = posterior(g.of(columns).total(without), np.arange(len(columns)))
+    named, at = [], data.nuisances
+    for c in (data.candidates[i] for i in chosen):
+        named += [slice(at, at + len(c.columns))] if c.slug != "inertials" else []
+        at += len(c.columns)
+    post = posterior(g.of(columns).total(without), np.arange(len(columns)), named)
     return dataclasses.replace(post, columns=columns)
 
 
