@@ -36,7 +36,7 @@ def compile_seconds(case: Case) -> float:
     return first - seconds(case)
 
 
-def stages(function: Case, *arguments: Any) -> dict[str, float]:
+def stages(function: Callable[..., Any], *arguments: Any) -> dict[str, float]:
     """Processor time of tracing, lowering and compiling a function [s]; forgets all that is compiled before it."""
     jax.clear_caches()
     start = time.process_time()

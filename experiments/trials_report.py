@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.problem import LEAST_SHARE
 
 DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs" / "trials.md"
 NINETY = 1.645  # standard deviations either way that a 90 % interval spans
@@ -49,6 +50,11 @@ def missed(case: dict) -> set:
     """What is hidden and has no finding; ordinary friction is in the law found at its joint that contains it."""
     held = {(s, js) for slug, js in truths(case) & founds(case) if slug in CATALOGUE for s in CATALOGUE[slug].contains}
     return truths(case) - founds(case) - held
+
+
+def _missed_that_matter(case: dict) -> set:
+    """What is missed though it makes as much torque as anything must that is named; play, lags may make none."""
+    return missed(case) & {_key(e) for e in case["truth"] if e.get("share", 1.0) >= LEAST_SHARE}
 
 
 def concealed(case: dict) -> set:
@@ -166,6 +172,8 @@ MEASURES: dict[str, dict[str, Callable[[list[dict]], str]]] = {
         "joints located exactly": lambda cs: _percent(
             {j for _, js in truths(c) for j in js} == {j for _, js in founds(c) for j in js} for c in cs),
         "name exact, nothing added": lambda cs: _percent(truths(c) == founds(c) for c in cs),
+        "exact, of those that make 0.5 % of a joint's torque": lambda cs: _percent(
+            not _missed_that_matter(c) and not _not_there(c) for c in cs),
         "exact, or what is missing is listed as not testable": lambda cs: _percent(_owned_up(c) for c in cs),
         "exact, or an oracle told the effect does not find it either": lambda cs: _percent(
             _beyond_an_oracle(c) for c in cs),
@@ -188,6 +196,8 @@ MEASURES: dict[str, dict[str, Callable[[list[dict]], str]]] = {
     },
     "several": {
         "every one named": lambda cs: _percent(not missed(c) for c in cs),
+        "every one named that makes 0.5 % of a joint's torque": lambda cs: _percent(
+            not _missed_that_matter(c) for c in cs),
         "exact, or what is missing is listed as not testable": lambda cs: _percent(_owned_up(c) for c in cs),
         "nothing missing that an oracle told the effects finds": lambda cs: _percent(
             not missed_by_us_alone(c) for c in cs),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers_problem import ROWS, TURNS, WAVE, problem
 
+from irb140_jax.mismatch import name
 from irb140_jax.mismatch.name import PREFER, _exchange
 
 NEAR = WAVE + 0.6 * np.random.default_rng(7).normal(size=ROWS)  # explains most of what WAVE explains
@@ -35,3 +36,15 @@ def test_more_parameters_must_be_clearly_better(size):
 def test_friction_has_all_of_it_to_overcome():
     done, more, hurdle = exchanged(("stribeck_friction", (0,), [WAVE]), 1.5)
     assert PREFER < more < hurdle and not done
+
+
+def test_rules_that_undo_each_other_end_at_once(monkeypatch):
+    asked = []
+
+    def swaps(*_):
+        asked.append(None)
+        return (1,) if len(asked) % 2 else (0,)
+
+    monkeypatch.setattr(name, "_exchange", swaps)
+    assert name._settled(problem([SPRING, GAIN], WAVE[None]), (0,)) == (0,)
+    assert len(asked) == 2

@@ -11,7 +11,7 @@ from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble, first_noise, pr
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
 from irb140_jax.mismatch.model import Named, better_known, composed
-from irb140_jax.mismatch.name import search
+from irb140_jax.mismatch.name import guessed, search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.problem import Problem
@@ -108,11 +108,13 @@ def _settled(
     blocks: int,
 ) -> Explanation:  # fmt: skip
     """Search and noise in turn: noise that the last explanation left may hide an effect that it named wrongly."""
-    rounds = 1 if noise else 2  # the noise of the round before is nearly right
+    # The noise of the round before is nearly right; the first is a guess, under which a full search would take minutes
+    # where there is much structure without a name.
+    rounds = (search,) if noise else (guessed, search)
     noise = noise or first_noise(data)
-    for _ in range(rounds):
+    for find in rounds:
         prob, g = problem(data, noise, blocks=1)
-        chosen = search(prob, chosen)
+        chosen = find(prob, chosen)
         noise = _noise_under(data, prob, g, chosen)
         del prob, g  # hundreds of megabytes, before the next are made
     prob, g = problem(data, noise, blocks)

@@ -21,11 +21,16 @@ def search(problem: Problem, start: tuple[int, ...] = ()) -> tuple[int, ...]:
     """
     chosen = _settled(problem, start)
     for _ in range(3):
-        settled = _joined(problem, _split(problem, _settled(problem, _grown(problem, chosen))))
+        settled = _joined(problem, _split(problem, guessed(problem, chosen)))
         if set(settled) == set(chosen):
             break
         chosen = settled
     return chosen
+
+
+def guessed(problem: Problem, start: tuple[int, ...] = ()) -> tuple[int, ...]:
+    """A set found by forward steps and what settles them: enough to see what noise there may be."""
+    return _settled(problem, _grown(problem, start))
 
 
 def _split(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
@@ -111,7 +116,8 @@ def _settled(
     problem: Problem, chosen: tuple[int, ...], joints: set[int] | None = None, banned: frozenset[int] = frozenset()
 ) -> tuple[int, ...]:
     """Exchange, simplify and remove until nothing improves, among the members at some joints or all."""
-    for _ in range(30):
+    seen = {frozenset(chosen)}
+    while True:
         near = tuple(c for c in chosen if joints is None or joints & set(problem.candidates[c].joints))
         changed = (
             _exchange(problem, chosen, near, banned)
@@ -121,7 +127,9 @@ def _settled(
         if changed is None:
             return chosen
         chosen = changed
-    return chosen
+        if frozenset(chosen) in seen:
+            return chosen  # what one rule puts in, another takes out
+        seen.add(frozenset(chosen))
 
 
 def _exchange(
