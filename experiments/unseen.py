@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from irb140_jax.mismatch.along import Loads, columns_along, prepared, seen_by
+from irb140_jax.mismatch.along import columns_along, prepared, seen_by
 from irb140_jax.mismatch.model import CorrectedModel, better_known, library_of, predict, torques_along
 from irb140_jax.recordings.conceal import ConcealedCase, Noise
 from irb140_jax.recordings.condition import condition
@@ -50,10 +50,10 @@ def _columns(model: CorrectedModel, case: ConcealedCase) -> tuple[np.ndarray, np
     smooth = condition(case.recordings[-1], model.band, pad=True)
     torques, lib = torques_along(model, smooth), library_of(model)
     along = seen_by(better_known(model.robot, model.phi_corrected, model.named), prepared(model.robot, smooth))
-    found = columns_along(lib, along, Loads(torques.load, torques.total, torques.carried))
+    found = columns_along(lib, along, torques.loads)
     one = np.ones(1)
     effects = [lib.torque(found.effects, np.array([k]), one) for c in lib.candidates for k in c.columns]
     parts = np.concatenate([found.Y, np.stack([torques.nominal, *effects], axis=-1)], axis=-1)
-    flat = filtered(parts.reshape(len(parts), -1), kernels(model.band.position, model.band.rate)[0], odd=False)
+    flat = filtered(parts.reshape(len(parts), -1), kernels(model.band.position, model.band.rate)[0])
     size = np.linalg.norm(flat, axis=0)
     return (flat / np.where(size > 0.0, size, 1.0)).reshape(parts.shape), smooth.t

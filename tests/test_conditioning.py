@@ -73,6 +73,18 @@ def test_ends_that_the_smoother_cannot_fill_are_left_out_unless_padded():
     assert np.isfinite(padded.qdd).all()
 
 
+@pytest.mark.parametrize("fastest", [0.7, 3.0])
+def test_a_recording_that_begins_and_ends_in_motion_is_smoothed_well_up_to_its_ends(fastest):
+    rng, t = np.random.default_rng(1), times(15.0)
+    rate, phase = 2.0 * np.pi * rng.uniform(0.1, fastest, 4), rng.uniform(0.0, 2.0 * np.pi, 4)
+    q = np.sum(np.sin(rate * t[:, None] + phase), axis=1) + 1e-5 * rng.normal(size=len(t))
+    r = condition(logged(t, q), BAND)
+    truth = -np.sum(rate**2 * np.sin(rate * r.t[:, None] + phase), axis=1)
+    ends = (r.t < 1.0) | (r.t > t[-1] - 1.0)
+    error = np.sqrt(np.mean((r.qdd[ends, 0] - truth[ends]) ** 2) / np.mean(truth**2))
+    assert error < 0.01
+
+
 def test_jittered_time_costs_little_accuracy():
     t = times()
     t = t + np.random.default_rng(0).uniform(-0.3, 0.3, len(t)) / RATE
@@ -287,8 +299,8 @@ def corrected_model(robot, *named):
 @pytest.mark.parametrize("rate", [125.0, 500.0])
 def test_predictions_have_one_row_a_row_and_are_right_up_to_the_ends(rate):
     robot = random_robot("H", 3)[0]
-    t = np.append(times(4.0, rate), 4.0)  # a sine is odd about both ends, as the padding is
-    q, qd, qdd = 0.5 * np.array(wave(t, 0.5))
+    t = np.append(times(4.0, rate), 4.0)
+    q, qd, qdd = 0.5 * np.array(wave(t + 0.6, 0.5))  # no symmetry about either end
     recording = dataclasses.replace(logged(t, q), joint_names=robot.joint_names)
     named = Named(CATALOGUE["viscous_friction"], (0,), (0,), np.array([2.5]), np.zeros(0))
     out = predict(corrected_model(robot, named), recording)
@@ -297,13 +309,13 @@ def test_predictions_have_one_row_a_row_and_are_right_up_to_the_ends(rate):
     nominal = np.asarray(dynamics.inverse_dynamics_batch(robot, *motion))
     moving = np.abs(qd) > 0.1  # else dry friction is rounded off
     scale = np.max(np.abs(nominal))
-    # Ripple of the smoother, and interpolation back onto the rows.
-    assert np.max(np.abs(out["nominal"] - nominal)[moving]) < 0.01 * scale
+    # Ripple of the smoother, interpolation back onto the rows, and what is guessed of the motion beyond the ends.
+    assert np.max(np.abs(out["nominal"] - nominal)[moving]) < 0.02 * scale
     np.testing.assert_array_equal(out["refit"], out["nominal"])
     # The corrected model: heavier by a tenth, and rubbing.
     rigid = np.asarray(dynamics.regressor_batch(robot, *motion)) @ np.asarray(robot.phi).ravel()
     expected = nominal + 0.1 * rigid + 2.5 * motion[1]
-    assert np.max(np.abs(out["corrected"] - expected)[moving]) < 0.01 * np.max(np.abs(expected))
+    assert np.max(np.abs(out["corrected"] - expected)[moving]) < 0.02 * np.max(np.abs(expected))
 
 
 def test_predictions_follow_the_rows_where_time_jitters_and_samples_are_lost():

@@ -140,9 +140,9 @@ LAWS_OF_MOTION = {
         1 + p["depth"] * np.exp(-(((AT(m.q, j) - p["centre"]) / p["width"]) ** 2))),
     "presliding_hysteresis": lambda p, m, j: dahl(p, AT(m.q, j)),
     "torque_ripple": lambda p, m, j: p["amplitude"] * np.sin(2 * np.pi * p["cycles_per_rad"] * AT(m.q, j)),
-    "actuator_lag": lambda p, m, j: p["time_constant"] * AT(m.total_rate, j),
+    "actuator_lag": lambda p, m, j: p["time_constant"] * AT(m.scaled_rate, j),
     "time_delay": lambda p, m, j: p["delay"] * np.stack(
-        [np.interp(m.t + 0.5 * p["delay"], m.t, x) for x in np.asarray(m.total_rate).T], axis=1),
+        [np.interp(m.t + 0.5 * p["delay"], m.t, x) for x in np.asarray(m.asked_rate).T], axis=1),
     "gravity_spring": lambda p, m, j: p["stiffness"] * (AT(m.q, j) - p["rest"]),
     "gravity_tilt": lambda p, m, j: p["tilt"] * float(m.rigid.gravity) * (m.rigid.by_gravity @ m.rigid.across[0]),
     "payload": lambda p, m, j: p["mass"] * np.asarray(m.rigid.held)[:, :, 0],
@@ -188,7 +188,7 @@ def rigid_body(rng, samples):
 def motion(seed=0, samples=60, rest_speed=RESTING):
     """Random motion, no joint slower than 0.01."""
     rng = np.random.default_rng(seed)
-    q, qd, qdd, load, total, *more = rng.normal(size=(7, samples, len(KINDS)))
+    q, qd, qdd, load, total, *more = rng.normal(size=(8, samples, len(KINDS)))
     qd += 0.01 * np.sign(qd)
     arrays = [jnp.asarray(x) for x in (q, qd, qdd, 9 * load, 10 * total, *more)]
     rigid = rigid_body(rng, samples)
@@ -490,7 +490,7 @@ def test_what_mjcf_expresses_is_the_same_in_the_model_as_beside_it(effect):
     rng = np.random.default_rng(2)
     q, qd, qdd = rng.normal(size=(3, 5, 1))
     tau = [np.stack([dynamics.inverse_dynamics(arm, *x) for x in zip(q, qd, qdd, strict=True)]) for arm in arms]
-    arrays = [jnp.asarray(x) for x in (q, qd, qdd, q, q, q, q)]
+    arrays = [jnp.asarray(x) for x in (q, qd, qdd, q, q, q, q, q)]
     near_rest = {"rest_speed": jnp.full(1, RESTING), "direction": jnp.sign(arrays[1])}
     m = Motion(jnp.arange(5.0), *arrays, rigid=rigid_body(rng, 5), **near_rest, recording=jnp.array(0.0))
     w, shape = effect.amplitudes({effect.parameters[0].name: 0.7})

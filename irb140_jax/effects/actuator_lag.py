@@ -20,7 +20,7 @@ class ActuatorLag(AbstractEffect):
         "joint_elasticity": "a chirp through the first resonance",
         "viscous_friction": "two excitation frequencies: the phase of a lag grows with frequency",
     }
-    logged = True
+    logged = 2
     needs = "fast changes of this joint's torque"
     history = "lets through what was asked for a moment before"
     steps = True
@@ -29,7 +29,7 @@ class ActuatorLag(AbstractEffect):
     )
 
     def columns(self, motion, joints, shape):
-        return of_site(motion.total_rate, joints)[:, :, None]
+        return of_site(motion.scaled_rate, joints)[:, :, None]
 
     def memory(self, q, tau):
         return tau

@@ -55,7 +55,8 @@ class Motion(eqx.Module):
         load: Torque the transmissions carry: rigid body and all but friction [N m or N], shape (T, n).
         total: Torque the motors give: load and friction [N m or N], shape (T, n).
         carried: What the links alone would need on the motors' path: no rotors, stiff gears [N m or N], shape (T, n).
-        total_rate: Time derivative of the total torque, shape (T, n).
+        scaled_rate: Time derivative of the total torque by the log's torque constants, shape (T, n).
+        asked_rate: Time derivative of what the log would show if its clocks were right: lags too, shape (T, n).
         rigid: What the rigid body does along the motion.
         rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
         direction: sign(qd), and between two signs what friction does while a joint sticks, shape (T, n).
@@ -69,7 +70,8 @@ class Motion(eqx.Module):
     load: JointSamples
     total: JointSamples
     carried: JointSamples
-    total_rate: JointSamples
+    scaled_rate: JointSamples
+    asked_rate: JointSamples
     rigid: "RigidBody"
     rest_speed: Joints
     direction: JointSamples
@@ -120,7 +122,8 @@ class AbstractEffect(abc.ABC):
         not_in_mjcf: What of it MJCF can't express and why, one sentence without its full stop; "" where nothing is.
         leans_on_inertials: Its torque is made of the rigid body's own, so it is known no better than the inertials.
         transmission: It acts before or inside the transmission, no part of what the links need on the motors' path.
-        logged: It is in what the log shows, not in what motors and links feel.
+        logged: 0, or its place in how a log comes about from what motors feel: 1 scales it, 2 lags, 3 is in the clocks.
+            Each works on what those before it have made of the torque.
         once: It happens once, in one recording; nothing of it can be predicted from the others.
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
         scouts: Its grid of shapes is looked for in the residual (see `scout`).
@@ -152,7 +155,7 @@ class AbstractEffect(abc.ABC):
     not_in_mjcf: ClassVar[str] = "MJCF has no such torque"
     leans_on_inertials: ClassVar[bool] = False
     transmission: ClassVar[bool] = False
-    logged: ClassVar[bool] = False
+    logged: ClassVar[int] = 0
     once: ClassVar[bool] = False
     everywhere: ClassVar[bool] = False
     scouts: ClassVar[bool] = False

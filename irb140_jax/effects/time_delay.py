@@ -26,7 +26,7 @@ class TimeDelay(AbstractEffect):
         "actuator_lag": "a delay acts on all joints alike",
         "viscous_friction": "two excitation frequencies: the phase of a delay grows with frequency",
     }
-    logged = True
+    logged = 3
     needs = "fast motion of several joints"
     everywhere = True
     history = "is in the clocks of the log, which shows a torque beside an earlier position"
@@ -40,7 +40,7 @@ class TimeDelay(AbstractEffect):
 
     def columns(self, motion, joints, shape):
         late = jax.vmap(lambda x: jnp.interp(motion.t + shape[0], motion.t, x), in_axes=1, out_axes=1)
-        return late(motion.total_rate)[:, :, None]
+        return late(motion.asked_rate)[:, :, None]
 
     def physical(self, w, shape):
         return w

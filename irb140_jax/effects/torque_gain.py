@@ -22,7 +22,7 @@ class TorqueGain(AbstractEffect):
         "rotor_inertia": "postures under gravity: a gain scales them, a rotor doesn't",
         "load_dependent_friction": "the same loads while standing still",
     }
-    logged = True
+    logged = 1
     needs = "large gravity torque on this joint that other joints' torques confirm, or a known payload"
     mjcf = "the gear of the actuator"
     not_in_mjcf = ""

@@ -44,11 +44,19 @@ def scales_of(along: Sequence["Prepared"]) -> Scales:
 
 
 class Loads(NamedTuple):
-    """Torques along a recording, each (T, n) [N m or N]; see `Motion`."""
+    """Torques along a recording, each (T, n) [N m or N].
+
+    Attributes:
+        load, total, carried: See `Motion`.
+        scaled, asked: Those whose rates are in `Motion`.
+    """
+
 
     load: np.ndarray
     total: np.ndarray
     carried: np.ndarray
+    scaled: np.ndarray
+    asked: np.ndarray
 
 
 STEP = 1e-5  # of the differences behind sensitivities [rad, rad/s, m ...]: errors of 1e-9 beside 1e-10 of rounding
@@ -155,10 +163,11 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
         recording: Its number; below 0 where the diagnosis did not see it.
     """
     r = along.recording
-    load, total, carried = loads or (along.nominal, along.nominal, along.nominal - along.motor_side)
+    nominal = along.nominal
+    load, total, carried, scaled, asked = loads or (nominal, nominal, nominal - along.motor_side, nominal, nominal)
     dt = float(np.mean(np.diff(r.t)))
-    rate = np.gradient(total, dt, axis=0)
-    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, rate, along.rigid, r.rest_speed, r.direction)
+    rates = (np.gradient(x, dt, axis=0) for x in (scaled, asked))
+    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, *rates, along.rigid, r.rest_speed, r.direction)
     which = np.array(float(recording))
     whole = Motion(*moving, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
     per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)

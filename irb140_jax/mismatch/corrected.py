@@ -168,8 +168,8 @@ class CorrectedRobot(AbstractPlant):
         return jax.lax.fori_loop(0, NEWTON_STEPS, step, jnp.zeros_like(q))
 
     def summed(self, motion: Motion, base: JointSamples, stepped) -> tuple[JointSamples, ...]:
-        """Load, carried and total torque, and what is logged (see `model.Torques`)."""
-        friction, logged, load = jnp.zeros_like(base), jnp.zeros_like(base), base
+        """Load, total, carried, scaled and asked torque (see `Loads`), and what is logged."""
+        friction, logged, load = jnp.zeros_like(base), [jnp.zeros_like(base)] * 3, base
         inside = self.motor_side(motion.qd, motion.qdd)
         for k, a in enumerate(self.effects):
             rows = jnp.arange(self.n) if a.effect.everywhere else jnp.array(a.joints)
@@ -177,13 +177,15 @@ class CorrectedRobot(AbstractPlant):
             columns = a.effect.columns(motion, jnp.array(a.joints), a.shape) if given is None else given[None]
             part = jnp.zeros_like(base).at[:, rows].add(columns @ a.amplitudes)
             if a.effect.logged:
-                logged += part
+                logged[a.effect.logged - 1] += part
             elif a.effect.friction:
                 friction += part
             else:
                 load += part
                 inside += part if a.effect.transmission else 0.0
-        return load, load - inside, load + friction, load + friction + logged
+        scales, lags, clocks = logged
+        total = load + friction
+        return load, total, load - inside, total + scales, total + scales + lags, total + scales + lags + clocks
 
     def own_torque(self, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> JointSamples:
         """Rotors, friction and springs of the model as given."""
@@ -217,15 +219,16 @@ def _torque(
     sensed = Sensitivities(robot.robot, robot.ahead, q, qd, qdd)
 
     def summed(_, torques):
-        load, carried, total, _ = torques
+        load, total, carried, scaled, asked, _ = torques
         rigid = cast(RigidBody, sensed)  # it has the same names, and derives what is asked for
         new = jnp.array(-1.0)  # no recording of the diagnosis
-        moving = (since, q, qd, qdd, load, total, carried, rate(total), rigid, robot.rest_speed, direction)
+        moving = (since, q, qd, qdd, load, total, carried, rate(scaled), rate(asked), rigid, robot.rest_speed, direction)
         motion = Motion(*moving, new)
         return robot.summed(motion, base, stepped)
 
     # Twice, as in the fit: columns that depend on the load see the corrected one the second time.
-    return jax.lax.fori_loop(0, 2, summed, (load, load - robot.motor_side(qd, qdd), load, load))[3]
+    carried = load - robot.motor_side(qd, qdd)
+    return jax.lax.fori_loop(0, 2, summed, (load, load, carried, load, load, load))[-1]
 
 
 def corrected_robot(model: CorrectedModel) -> CorrectedRobot:

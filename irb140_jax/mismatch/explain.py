@@ -160,8 +160,7 @@ def _better_known(robot: Robot, found: tuple[np.ndarray, list[Candidate], list[n
 def _loads(lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]], r: Prepared, index: int) -> Loads:
     """Loads of an explanation (see `fitted`) along a recording."""
     dphi, members, amplitudes = found
-    torques = composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi)
-    return Loads(torques.load, torques.total, torques.carried)
+    return composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi).loads
 
 
 def fitted(

@@ -69,17 +69,14 @@ class Torques:
     Attributes:
         nominal: Of the model as given.
         refit: Of the rigid body with refitted inertials.
-        load: What the transmissions carry: corrected rigid body, all effects but friction and what only the log shows.
-        carried: What of the load the links alone would need on the motors' path.
-        total: Load and friction: what the motors really give.
+        loads: Of the corrected model: what the transmissions carry is corrected rigid body, all effects but friction and
+            what only the log shows.
         corrected: What the controller logs: total, by its torque constants, when and as it was asked for.
     """
 
     nominal: np.ndarray
     refit: np.ndarray
-    load: np.ndarray
-    carried: np.ndarray
-    total: np.ndarray
+    loads: Loads
     corrected: np.ndarray
 
 
@@ -123,18 +120,19 @@ def composed(
     """
     Y, nominal, inside, columns = along
     load = nominal + Y @ dphi_corrected
-    friction, logged = np.zeros_like(load), np.zeros_like(load)
+    friction, logged = np.zeros_like(load), np.zeros((3, *load.shape))
     for c, w in zip(candidates, amplitudes, strict=True):
         part = lib.torque(columns, c.columns, w)
         if c.effect.logged:
-            logged += part
+            logged[c.effect.logged - 1] += part
         elif c.effect.friction:
             friction += part
         else:
             load = load + part
             inside = inside + part if c.effect.transmission else inside
     total = load + friction
-    return Torques(nominal, nominal + Y @ dphi_refit, load, load - inside, total, total + logged)
+    scaled, asked, corrected = total + np.cumsum(logged, axis=0)
+    return Torques(nominal, nominal + Y @ dphi_refit, Loads(load, total, load - inside, scaled, asked), corrected)
 
 
 def library_of(model: CorrectedModel) -> Library:
@@ -162,8 +160,7 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     if not model.named:
         return torques
     # Columns that depend on the load see the corrected one, as they did in the fit.
-    loads = Loads(torques.load, torques.total, torques.carried)
-    return composed(lib, columns_along(lib, along, loads), lib.candidates, amplitudes, *shifts)
+    return composed(lib, columns_along(lib, along, torques.loads), lib.candidates, amplitudes, *shifts)
 
 
 def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray]:
@@ -188,7 +185,7 @@ def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray
     t, out = prediction_times(recording), {}
     taps = kernels(model.band.position, model.band.rate)[0]
     for name in ("nominal", "refit", "corrected"):
-        values = filtered(getattr(torques, name), taps, odd=False)
+        values = filtered(getattr(torques, name), taps)
         out[name] = np.stack([np.interp(t, smooth.t, values[:, j]) for j in range(values.shape[1])], axis=1)
     return out
 

@@ -13,7 +13,7 @@ from scipy import interpolate, ndimage
 
 from irb140_jax import dynamics
 from irb140_jax.recordings.direction import REST, direction_of
-from irb140_jax.recordings.low_pass import Band, filtered, kernels
+from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.smooth import noise_density, signal_limit, white_density, without_noise
 from irb140_jax.robot import Robot
@@ -99,7 +99,7 @@ def _coherent_limit(smooth: list["Conditioned"], robot: Robot, band: Band) -> fl
     for r in smooth:
         m = np.asarray(dynamics.inverse_dynamics_batch(moving, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
         friction = np.concatenate([r.direction, r.qd], axis=1)
-        slow = filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), kernels(SLOW, band.rate)[0], odd=False)
+        slow = filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), kernels(SLOW, band.rate)[0])
         for j in range(robot.n):
             inputs = np.concatenate([slow[:, [robot.n + j, 2 * robot.n + j]], slow[:, 3 * robot.n :]], axis=1)
             inputs = np.concatenate([inputs, np.ones((len(inputs), 1))], axis=1)
@@ -147,8 +147,8 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     anti_alias = kernels(min(0.4 * band.rate, 0.45 * raw_rate), raw_rate)[0]
     white = white_density(recording, raw_rate)
     q, speed_noise = without_noise(q, white, raw_rate, h1, resampled=t is not recording.t)
-    smoothed = [filtered(q, k, odd=True) for k in (h, h1, h2)]
-    tau = filtered(tau, anti_alias, odd=False)
+    smoothed = [convolved(q, k) for k in (h, h1, h2)]
+    tau = filtered(tau, anti_alias)
     keep = slice(None) if pad else slice(half, len(t) - half)
     grid = np.arange(t[keep][0], t[keep][-1] + 1e-9, 1.0 / band.rate)
     q, qd, qdd, tau = (_at(grid, t, x) for x in (*smoothed, tau))

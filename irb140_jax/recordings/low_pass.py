@@ -72,8 +72,12 @@ def kernels(cutoff: float, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndar
     return h, -h1 / (h1 @ x), h2 * 2.0 / (h2 @ x**2)
 
 
-def filtered(x: np.ndarray, taps: np.ndarray, *, odd: bool) -> np.ndarray:
-    """Zero-phase FIR along axis 0, ends reflected (about the end point when `odd`)."""
+def filtered(x: np.ndarray, taps: np.ndarray) -> np.ndarray:
+    """Zero-phase FIR along axis 0, ends reflected, shape of x."""
     half = (len(taps) - 1) // 2
-    extended = np.pad(x, ((half, half), (0, 0)), mode="reflect", reflect_type="odd" if odd else "even")
-    return signal.oaconvolve(extended, taps[:, None], mode="valid", axes=0)
+    return convolved(np.pad(x, ((half, half), (0, 0)), mode="reflect"), taps)
+
+
+def convolved(x: np.ndarray, taps: np.ndarray) -> np.ndarray:
+    """Zero-phase FIR along axis 0 where it is filled, shape (T + 1 - len(taps), n)."""
+    return signal.oaconvolve(x, taps[:, None], mode="valid", axes=0)

@@ -6,6 +6,11 @@ from scipy.signal import windows
 
 from irb140_jax.recordings.recording import Recording
 
+BEYOND = 2.0  # [s] for which a recording is continued beyond its ends
+ROUNDS = 4  # in which that is smoothed; ten are better by a tenth
+QUARTIC = 4  # the polynomial that tells the acceleration at an end ...
+ENDS = 0.5  # ... from so many periods of the highest frequency in the motion ...
+SHORTEST, LONGEST = 0.1, 1.0  # ... but not less, nor more [s]
 CERTAIN = 1.5  # times the noise that a spectrum must exceed before any of it counts as signal: its own scatter
 
 
@@ -15,7 +20,7 @@ def without_noise(
     """Wiener's smoother: every frequency of every joint's position weighted by the share of it that is signal.
 
     What is optimal for q is so for its derivatives too.  Without it, encoder noise between the motion's highest
-    frequency and the band's would fill qdd.
+    frequency and the band's would fill qdd.  Beyond its ends a recording goes on as its own spectrum has it (`_goes_on`).
 
     Args:
         q: Positions on an even grid, shape (T, n).
@@ -25,25 +30,56 @@ def without_noise(
         resampled: Whether the spectrum's top no longer shows the noise.
 
     Returns:
-        Positions, shape (T, n), and the standard deviation of the noise in their speeds, shape (n,).
+        Positions, with as many beyond either end as the differentiator reaches, shape (T + len(h1) - 1, n); and the
+        standard deviation of the noise in their speeds, shape (n,).
 
     Source: N. Wiener, Extrapolation, Interpolation and Smoothing of Stationary Time Series, 1949.
     """
-    reach = min(len(q) - 1, int(2.0 * rate))
-    longer = np.pad(q, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
-    trend = np.linspace(0.0, 1.0, len(longer))[:, None] * (longer[-1] - longer[0]) + longer[0]
-    spectrum = np.fft.rfft(longer - trend, axis=0)
-    f = np.fft.rfftfreq(len(longer), 1.0 / rate)
-    out, noise = np.empty_like(q), np.zeros(q.shape[1])
+    half = (len(h1) - 1) // 2
+    reach = max(min(len(q) - 1, int(BEYOND * rate)), half)
+    out, noise = np.empty((len(q) + 2 * half, q.shape[1])), np.zeros(q.shape[1])
+    f = np.fft.rfftfreq(len(q) + 2 * reach, 1.0 / rate)
     for j in range(q.shape[1]):
         share, floor, at = _signal_share(q[:, j], white[j] if resampled else 0.0, rate)
-        weight = np.interp(f, at, share)
-        out[:, j] = (np.fft.irfft(spectrum[:, j] * weight, len(longer)) + trend[:, j])[reach : reach + len(q)]
+        longer = _goes_on(q[:, j], rate, reach, np.interp(f, at, share))
+        out[:, j] = longer[reach - half : reach + len(q) + half]
         response = np.abs(np.fft.rfft(h1, 8192)) * np.interp(np.fft.rfftfreq(8192, 1.0 / rate), at, share)
         # Jerks fill the top of the spectrum, but few samples.
         floor = min(floor, white[j])
         noise[j] = np.sqrt(floor * np.sum(response**2) * rate / 8192)
     return out, noise
+
+
+def _goes_on(x: np.ndarray, rate: float, reach: int, weight: np.ndarray) -> np.ndarray:
+    """A position smoothed, with `reach` samples before and after that it most likely had, shape (T + 2 reach,).
+
+    It is reflected about its ends, bent by twice the acceleration there, which a reflection would turn round: a step of
+    qdd fills the spectrum, and what the smoother takes from that rings for half a second.  What lies beyond the ends is
+    then replaced by what the smoother makes of it, a few times: expectation maximisation with missing samples.
+    """
+    longer = np.pad(x, reach, mode="reflect", reflect_type="odd")
+    seconds = np.arange(reach, 0, -1) / rate
+    bent = seconds**2 * np.cos(0.5 * np.pi * seconds / seconds[0]) ** 2 if reach else seconds
+    longer[:reach] += _acceleration(x, rate) * bent
+    longer[len(longer) - reach :] += _acceleration(x[::-1], rate) * bent[::-1]
+    for _ in range(ROUNDS):
+        longer[reach : reach + len(x)] = x
+        trend = np.linspace(longer[0], longer[-1], len(longer))
+        longer = np.fft.irfft(np.fft.rfft(longer - trend) * weight, len(longer)) + trend
+    return longer
+
+
+def _acceleration(x: np.ndarray, rate: float) -> float:
+    """Second derivative at the first sample, by a quartic, shrunk by what noise there may be in it."""
+    seconds = ENDS / max(signal_limit(x, 0.0, rate), ENDS / LONGEST)
+    count = min(max(int(max(seconds, SHORTEST) * rate), QUARTIC + 4), len(x))
+    if count < QUARTIC + 4:
+        return 0.0
+    powers = np.vander(np.arange(count) / count, QUARTIC + 1, increasing=True)
+    w, rss = np.linalg.lstsq(powers, x[:count], rcond=None)[:2]
+    variance = 4.0 * np.linalg.inv(powers.T @ powers)[2, 2] * float(np.sum(rss)) / (count - QUARTIC - 1)
+    a = 2.0 * w[2]
+    return float(a * max(1.0 - variance / max(a**2, 1e-300), 0.0) * (rate / count) ** 2)
 
 
 def _signal_share(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, float, np.ndarray]:
