@@ -153,10 +153,12 @@ def held_out_gain(ex: Explanation, without: int) -> tuple[float, float]:
 def transferring(ex: Explanation) -> Explanation:
     """The explanation without findings, or refinements of a simpler law, that do not help on unseen data.
 
-    A name must transfer: a refinement by as much as the search asks of it on seen data, a finding at all.
+    A name must transfer: a refinement by as much as the search asks of it on seen data, a finding at all.  Beside the
+    error on unseen data counts how far the inertials must be from where the model has them, in stated standard
+    deviations: a rotor or a payload that inertials of twenty deviations could stand for predicts no better than they.
     """
     while True:
-        error = unseen_error(ex, ex.chosen)
+        error = unseen_error(ex, ex.chosen) + _strain(ex, ex.chosen)
         worst, better = 0.0, ex.chosen
         for c in ex.chosen:
             if ex.data.candidates[c].slug == "inertials":
@@ -165,12 +167,19 @@ def transferring(ex: Explanation) -> Explanation:
             fits = np.isfinite(ex.problem.scores(rest, ex.data.candidates[c].joints))
             options = [o for o in possible_beside(ex.problem, rest, simpler(ex.problem, c)) if fits[list(o)].all()]
             for option, least in ((), 0.0), *((o, PREFER) for o in options):
-                loss = 0.5 * (unseen_error(ex, (*rest, *option)) - error) - least
+                other = (*rest, *option)
+                loss = 0.5 * (unseen_error(ex, other) + _strain(ex, other) - error) - least
                 if loss < worst:
                     worst, better = loss, (*rest, *option)
         if better == ex.chosen:
             return ex
         ex = dataclasses.replace(ex, chosen=better)
+
+
+def _strain(ex: Explanation, chosen: tuple[int, ...]) -> float:
+    """Squared shift of the inertials that a set needs, in stated standard deviations."""
+    mean = full_posterior(ex.data, ex.problem, ex.grams, chosen).mean
+    return float(mean[: ex.data.nuisances] @ mean[: ex.data.nuisances])
 
 
 def jackknife_factor(ex: Explanation) -> np.ndarray:
