@@ -60,6 +60,7 @@ class Motion(eqx.Module):
         rigid: What the rigid body does along the motion.
         rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
         direction: sign(qd), and between two signs what friction does while a joint sticks, shape (T, n).
+        turning: Time derivative of the direction, shape (T, n).
         recording: Number of the recording, from 0; below 0 for motion that the diagnosis did not see, shape ().
     """
 
@@ -75,6 +76,7 @@ class Motion(eqx.Module):
     rigid: "RigidBody"
     rest_speed: Joints
     direction: JointSamples
+    turning: JointSamples
     recording: Scalar
 
 
@@ -131,6 +133,7 @@ class AbstractEffect(abc.ABC):
         scanned: From how many shapes a scout picks the best: what chance has as many tries at.
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
         tied: Its amplitudes are of one order of size: what the data can't see of one, the others bound.
+        silent: It competes with what was left out, and is not that: no finding bears its name.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
         steps: Whether it can be simulated forward in time all the same (see `memory` and `step`).
@@ -163,6 +166,7 @@ class AbstractEffect(abc.ABC):
     scanned: ClassVar[int] = 1
     adds_up: ClassVar[bool] = False
     tied: ClassVar[bool] = False
+    silent: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)
     history: ClassVar[str | None] = None
     steps: ClassVar[bool] = False

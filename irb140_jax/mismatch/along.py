@@ -168,6 +168,7 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
     dt = float(np.mean(np.diff(r.t)))
     rates = (np.gradient(x, dt, axis=0) for x in (scaled, asked))
     moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, *rates, along.rigid, r.rest_speed, r.direction)
+    moving = (*moving, np.gradient(r.direction, dt, axis=0))
     which = np.array(float(recording))
     whole = Motion(*moving, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
     per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)

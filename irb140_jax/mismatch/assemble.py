@@ -4,12 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect
 from irb140_jax.mismatch.along import Stretch
 from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.evidence import Grams, eliminated, grams
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.problem import Problem
+from irb140_jax.mismatch.silent import LooseInertials
 
 TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a share of the joint's torque
 LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
@@ -20,30 +20,6 @@ LAST_PRIOR = -10.0 * np.log(3.0)
 FEWEST_ROWS = 40  # of a joint: any explanation fits fewer, and what is left of them is no measure of noise
 ROUNDING = 1e-9  # of a joint's torque: a column that moves less moves nothing
 BLOCKS = 5  # contiguous blocks per recording: for jackknife intervals, and folds where there is one recording
-
-
-class LooseInertials(AbstractEffect):
-    """Not left-out physics: a link whose inertials are wrong beyond the stated uncertainty, competing with physics."""
-
-    slug = "inertials"
-    title = "inertials wrong beyond their stated uncertainty"
-    equation = "Y_link (phi - phi_nominal)"
-    source = "prior of `inertial_prior_factor`, widened"
-    parameters = ()
-    variants = (tuple(range(10)),)
-    needs = "motion of this joint and the joints before it"
-
-    def columns(self, motion, joints, shape):
-        raise NotImplementedError("these columns are the regressor's")
-
-    def physical(self, w, shape):
-        return w[:0]
-
-    def amplitudes(self, values):
-        raise NotImplementedError("inertials have no amplitudes of their own")
-
-    def where(self, names, values, units):
-        return f"{names}: in the rigid body's own torques"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,6 +15,7 @@ from irb140_jax.mismatch.name import guessed, search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.problem import Problem
+from irb140_jax.mismatch.silent import Turnover
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
@@ -76,7 +77,7 @@ def explain(
         uncertainty: Relative standard deviation of the inertials.
         progress: Told what is being done.
     """
-    factor = inertial_prior_factor(robot, 1.0)
+    factor, effects = inertial_prior_factor(robot, 1.0), (*effects, Turnover())
     progress("rigid body along the recordings")
     along = [prepared(robot, r) for r in recordings]
     scales = scales_of(along)

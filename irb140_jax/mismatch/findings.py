@@ -13,6 +13,7 @@ from irb140_jax.mismatch.name import PREFER
 from irb140_jax.mismatch.problem import group_odds
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
 from irb140_jax.mismatch.scout import left_over
+from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.robot import Robot
 
 NEIGHBOURS = 12  # shapes around the named one that tell how finely its grid resolves each parameter
@@ -30,7 +31,7 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         c = ex.data.candidates[index]
         rows = slice(at, at + len(c.columns))
         at += len(c.columns)
-        if c.slug == "inertials":
+        if c.effect.silent:
             continue
         values = _parameters(robot, ex, index, w[rows], cov[rows, rows], float(np.max(widen[rows])))
         names = ", ".join(robot.joint_names[j] for j in c.joints)
@@ -164,7 +165,7 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
     odds = {
         key: value
         for key, value in group_odds(ex.problem, rest).items()
-        if set(key[1]) & set(c.joints) and key[0] != "inertials" and key not in taken
+        if set(key[1]) & set(c.joints) and key[0] not in SILENT and key not in taken
     }
     own = odds[c.slug, c.joints]
     joints = list(c.joints)
@@ -198,7 +199,7 @@ def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[tuple[s
             continue
         base = ex.problem.odds(rest, (i,))
         for (slug, joints), value in group_odds(ex.problem, (*rest, i)).items():
-            known = slug == "inertials" or slug in c.effect.contains or slug == c.slug
+            known = slug in SILENT or slug in c.effect.contains or slug == c.slug
             if joints == c.joints and not known and special.slug not in CATALOGUE[slug].contains:
                 odds[slug, joints] = max(odds.get((slug, joints), -np.inf), base + value)
     return odds

@@ -13,6 +13,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.along import Columns, Loads, columns_along, prepared, seen_by
 from irb140_jax.mismatch.candidates import Candidate, Library
+from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.recordings.condition import Conditioned, condition
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
@@ -224,6 +225,7 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
     """The inverse of `to_json`."""
     robot = data["robot"]
     leaves = {k: jnp.asarray(np.array(_infinite(v), dtype=float)) for k, v in robot["leaves"].items()}
+    known = CATALOGUE | SILENT
     return CorrectedModel(
         Robot(
             **leaves,  # pyright: ignore[reportArgumentType]: arrays only, static fields are named below
@@ -233,7 +235,7 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
         np.array(data["phi_corrected"]),
         tuple(
             Named(
-                CATALOGUE[e["effect"]], tuple(e["joints"]), tuple(e["variant"]), np.array(e["amplitudes"], dtype=float),
+                known[e["effect"]], tuple(e["joints"]), tuple(e["variant"]), np.array(e["amplitudes"], dtype=float),
                 np.array(e["shape"], dtype=float),
             )
             for e in data["effects"]

@@ -161,7 +161,7 @@ def transferring(ex: Explanation) -> Explanation:
         error = unseen_error(ex, ex.chosen) + _strain(ex, ex.chosen)
         worst, better = 0.0, ex.chosen
         for c in ex.chosen:
-            if ex.data.candidates[c].slug == "inertials":
+            if ex.data.candidates[c].effect.silent:
                 continue
             rest = tuple(x for x in ex.chosen if x != c)
             fits = np.isfinite(ex.problem.scores(rest, ex.data.candidates[c].joints))

@@ -117,7 +117,7 @@ def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, i
     H, _ = eliminated(ex.problem.H, ex.problem.columns(ex.chosen))
     seen: dict[Site, tuple[float, int]] = {}
     for i, c in enumerate(ex.data.candidates):
-        if c.slug == "inertials" or any(_related(c, m) for m in ex.members):
+        if c.effect.silent or any(_related(c, m) for m in ex.members):
             continue
         if c.effect.scouts and not matters.amplitudes[c.columns].any():
             continue  # a wall or a push at no place or time in particular

@@ -115,8 +115,8 @@ def undecided(
     """
     names = ex.lib.robot.joint_names
     table = _Table(ex)
-    physics = tuple(c for c in ex.chosen if ex.data.candidates[c].slug != "inertials")
-    loose = tuple(c for c in ex.chosen if c not in physics)
+    physics = tuple(c for c in ex.chosen if not ex.data.candidates[c].effect.silent)
+    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
     pairs = []
     for f in findings:
         site = tuple(names.index(j) for j in f["joints"])

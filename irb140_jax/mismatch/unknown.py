@@ -268,7 +268,7 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
         at += len(c.columns)
         torque = [s.X[..., post.columns[part]] @ w[part] for s in ex.data.stretches]
         energy = np.sum([np.sum((x / ex.noise.total[r]) ** 2, axis=0) for r, x in enumerate(torque)], axis=0)
-        if c.slug != "inertials" and energy[j] > ALMOST_ALL * energy.sum():
+        if not c.effect.silent and energy[j] > ALMOST_ALL * energy.sum():
             torques[index] = rows.of([x[:, j] for x in torque])
     out, y = [], rows.residual
     for index in sorted(torques, key=lambda i: float(np.sum(torques[i] ** 2))):
