@@ -45,7 +45,9 @@ def test_the_columns_of_the_skeleton_are_its_formula(extended):
     rigid = RigidBody(*(none,) * 10)
     rest = jnp.full(3, 1e-3)
     direction = jnp.tanh(jnp.asarray(qd) / rest)
-    motion = Motion(jnp.arange(50.0), q, jnp.asarray(qd), q, q, q, q, q, q, rigid, rest, direction, direction, jnp.array(0.0))
+    torques = (q, q, q, q, q)
+    near_rest = (rest, direction, direction)
+    motion = Motion(jnp.arange(50.0), q, jnp.asarray(qd), q, *torques, rigid, *near_rest, jnp.array(0.0))
     law = extended["quadratic_drag"]
     w, shape = law.amplitudes({"drag": 1.7})
     torque = law.columns(motion, jnp.array([1]), jnp.asarray(shape)) @ w

@@ -193,8 +193,8 @@ def motion(seed=0, samples=60, rest_speed=RESTING):
     arrays = [jnp.asarray(x) for x in (q, qd, qdd, 9 * load, 10 * total, *more)]
     rigid = rigid_body(rng, samples)
     speeds = jnp.full(len(KINDS), rest_speed)
-    near_rest = {"rest_speed": speeds, "direction": jnp.tanh(arrays[1] / speeds)}
-    near_rest["turning"] = jnp.gradient(near_rest["direction"], axis=0)
+    direction = jnp.tanh(arrays[1] / speeds)
+    near_rest = {"rest_speed": speeds, "direction": direction, "turning": jnp.asarray(jnp.gradient(direction, axis=0))}
     return Motion(jnp.arange(samples) / 20.0, *arrays, rigid=rigid, **near_rest, recording=jnp.array(0.0))
 
 

@@ -166,9 +166,9 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
     nominal = along.nominal
     load, total, carried, scaled, asked = loads or (nominal, nominal, nominal - along.motor_side, nominal, nominal)
     dt = float(np.mean(np.diff(r.t)))
-    rates = (np.gradient(x, dt, axis=0) for x in (scaled, asked))
-    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, *rates, along.rigid, r.rest_speed, r.direction)
-    moving = (*moving, np.gradient(r.direction, dt, axis=0))
+    rates = np.gradient(scaled, dt, axis=0), np.gradient(asked, dt, axis=0)
+    near_rest = (r.rest_speed, r.direction, np.gradient(r.direction, dt, axis=0))
+    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, *rates, along.rigid, *near_rest)
     which = np.array(float(recording))
     whole = Motion(*moving, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
     per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)

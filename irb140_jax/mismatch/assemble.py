@@ -14,8 +14,8 @@ from irb140_jax.mismatch.silent import LooseInertials
 TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a share of the joint's torque
 LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
 LOOSE_PRIOR = np.log(0.2)  # such a link is rarer than a left-out effect
-# The last link's inertials and a payload's are one thing under two priors, whose widths mean little: a factor of three in
-# each of ten parameters.  Unless that is not enough, or no mass explains it, what is wrong there is what is held there.
+# The last link's inertials and a payload's are one thing under two priors, whose widths mean little: a factor of three
+# in each of ten parameters.  Unless that is not enough, or no mass explains it, what is wrong is what is held there.
 LAST_PRIOR = -10.0 * np.log(3.0)
 FEWEST_ROWS = 40  # of a joint: any explanation fits fewer, and what is left of them is no measure of noise
 ROUNDING = 1e-9  # of a joint's torque: a column that moves less moves nothing

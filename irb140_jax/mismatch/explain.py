@@ -15,8 +15,8 @@ from irb140_jax.mismatch.name import guessed, search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.problem import Problem
-from irb140_jax.mismatch.silent import Turnover
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
+from irb140_jax.mismatch.silent import Turnover
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot

@@ -70,8 +70,8 @@ class Torques:
     Attributes:
         nominal: Of the model as given.
         refit: Of the rigid body with refitted inertials.
-        loads: Of the corrected model: what the transmissions carry is corrected rigid body, all effects but friction and
-            what only the log shows.
+        loads: Of the corrected model: transmissions carry the corrected rigid body and all effects, but for friction
+            and what only the log shows.
         corrected: What the controller logs: total, by its torque constants, when and as it was asked for.
     """
 

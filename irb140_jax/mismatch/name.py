@@ -157,7 +157,7 @@ def _exchange(
             c = problem.candidates[i]
             if len(drop) == 1 and c.slug in old[0].effect.contains:
                 continue  # `_simplify` decides that
-            more = _size(c) > sum(_size(o) for o in old)
+            more = _size(c) > sum(_size(o) for o in old) and not all(o.effect.silent for o in old)
             rarer = all(o.effect.ordinary for o in old) and not c.effect.ordinary
             # More parameters, or a rarer law in the place of ordinary friction, must be clearly better.
             gain = scores[i] - (PREFER + hurdle[i] if more or rarer else 0.0)
