@@ -5,6 +5,7 @@ import numpy as np
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.problem import Problem
+from irb140_jax.mismatch.silent import SILENT
 
 ROWS = 80
 RNG = np.random.default_rng(0)
@@ -20,8 +21,9 @@ def problem(members, y, recordings: int = 1, shapes: tuple[int, ...] = ()) -> Pr
     X = np.stack([np.asarray(torque, dtype=float) for _, _, torque in members] + [y], axis=-1)
     per_joint = np.einsum("jtk,jtl->jkl", X, X)
     limit, none = np.full((len(members), 1), np.inf), np.zeros(len(members))
+    known = CATALOGUE | SILENT
     candidates = tuple(
-        Candidate(CATALOGUE[slug], joints, np.zeros(int(k in shapes)), np.array([k]), (0,), -limit[k], limit[k])
+        Candidate(known[slug], joints, np.zeros(int(k in shapes)), np.array([k]), (0,), -limit[k], limit[k])
         for k, (slug, joints, _) in enumerate(members)
     )
     energy = np.tile(np.maximum(np.sum(np.square(y), axis=1) / recordings, 1e-300), (recordings, 1))

@@ -38,6 +38,14 @@ def test_friction_has_all_of_it_to_overcome():
     assert PREFER < more < hurdle and not done
 
 
+def test_physics_takes_the_place_of_an_early_turnover_at_even_odds():
+    turnover, delay = ("turnover", (0,), [NEAR]), ("time_delay", (0,), [WAVE])
+    there = problem([FRICTION, turnover, delay], (50.0 * TURNS + 0.6 * WAVE)[None], shapes=(2,))
+    more = there.odds((0,), (2,)) - there.odds((0,), (1,))
+    assert 0.0 < more < PREFER
+    assert _exchange(there, (0, 1), (0, 1), frozenset()) == (0, 2)
+
+
 def test_rules_that_undo_each_other_end_at_once(monkeypatch):
     asked = []
 

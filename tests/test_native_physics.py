@@ -1,4 +1,6 @@
-"""Physics that MuJoCo has itself (frictionloss, damping, armature), on an arm and in a loop that are not ours."""
+"""Physics that MuJoCo has itself (frictionloss, damping, armature), on arms and in a loop that are not ours."""
+
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -8,28 +10,34 @@ from irb140_jax.mismatch import diagnose
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import robot_from_model
 
-SCARA = """<mujoco><compiler angle="radian" inertiafromgeom="true"/><option timestep="0.001"/><worldbody>
-<body pos="0 0 .3"><joint name="shoulder" axis="0 0 1" range="-2.2 2.2" armature=".05"/>
+HEAD = '<mujoco><compiler angle="radian" inertiafromgeom="true"/><option timestep="0.001"/><worldbody>'
+SCARA = HEAD + """<body pos="0 0 .3"><joint name="shoulder" axis="0 0 1" range="-2.2 2.2" armature=".05"/>
  <geom type="capsule" fromto="0 0 0 .25 0 0" size=".05" density="2500"/>
  <body pos=".25 0 0"><joint name="elbow" axis="0 0 1" range="-2.4 2.4" armature=".03"/>
   <geom type="capsule" fromto="0 0 0 .2 0 0" size=".04" density="2500"/>
   <body pos=".2 0 0"><joint name="lift" type="slide" axis="0 0 -1" range="0 .2" armature="1.5"/>
    <geom type="cylinder" size=".012 .15" density="7800"/>
 </body></body></body></worldbody></mujoco>"""
-HIDDEN = {("coulomb_friction", "shoulder"): 0.2, ("viscous_friction", "lift"): 25.0, ("rotor_inertia", "elbow"): 0.04}
+PENDULUM = HEAD + """<body pos="0 0 1"><joint name="swing" axis="0 1 0" range="-3 3" armature=".02"/>
+ <geom type="capsule" fromto="0 0 0 0 0 -.5" size=".03" density="2700"/></body></worldbody></mujoco>"""
 
 
-def recorded(rng: np.random.Generator, seconds: float = 12.0) -> Recording:
+def model_of(xml: str) -> mujoco.MjModel:
+    """Without contacts."""
+    model = mujoco.MjModel.from_xml_string(xml)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    return model
+
+
+def recorded(xml: str, hide: Callable[[mujoco.MjModel], None], rng: np.random.Generator, seconds=12.0) -> Recording:
     """A sum of sines under computed torque and proportional-derivative feedback; torques with 1 % of noise."""
-    nominal, true = (mujoco.MjModel.from_xml_string(SCARA) for _ in range(2))
-    for model in (nominal, true):
-        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    true.dof_frictionloss[0] = HIDDEN["coulomb_friction", "shoulder"]
-    true.dof_damping[2] = HIDDEN["viscous_friction", "lift"]
-    true.dof_armature[1] += HIDDEN["rotor_inertia", "elbow"]
-    model, plant, torque = mujoco.MjData(nominal), mujoco.MjData(true), np.zeros(3)
-    middle, reach = np.array([0.0, 0.0, 0.1]), np.array([1.2, 1.2, 0.06])
-    rate, phase = 2.0 * np.pi * rng.uniform(0.15, 0.8, (3, 3)), rng.uniform(0.0, 2.0 * np.pi, (3, 3))
+    nominal, true = model_of(xml), model_of(xml)
+    hide(true)
+    n = nominal.nv
+    model, plant, torque = mujoco.MjData(nominal), mujoco.MjData(true), np.zeros(n)
+    low, high = nominal.jnt_range.T
+    middle, reach = 0.5 * (low + high), 0.3 * (high - low)
+    rate, phase = 2.0 * np.pi * rng.uniform(0.15, 0.8, (3, n)), rng.uniform(0.0, 2.0 * np.pi, (3, n))
     wave = lambda f, t, power: reach * np.mean(f(rate * t + phase) * rate**power, axis=0)  # noqa: E731
     plant.qpos[:], plant.qvel[:] = middle + wave(np.sin, 0.0, 0), wave(np.cos, 0.0, 1)
     q, tau = [], []
@@ -46,15 +54,45 @@ def recorded(rng: np.random.Generator, seconds: float = 12.0) -> Recording:
         mujoco.mj_step(true, plant)
     q, tau = np.array(q)[::2], np.array(tau)[::2]
     noise = 0.01 * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)
-    return Recording(
-        t=times[::2], q=q + 1e-5 * rng.normal(size=q.shape), tau=tau + noise, qd=None, qdd=None, extras={},
-        joint_names=("shoulder", "elbow", "lift"), source="native", notes=(),
-    )  # fmt: skip
+    names = tuple(nominal.joint(j).name for j in range(n))
+    return Recording(times[::2], q + 1e-5 * rng.normal(size=q.shape), tau + noise, names, source="native")
+
+
+def named(xml: str, hide: Callable[[mujoco.MjModel], None], seed: int) -> dict[tuple[str, ...], float]:
+    """The first parameter of every finding."""
+    rng = np.random.default_rng(seed)
+    robot = robot_from_model(mujoco.MjModel.from_xml_string(xml), source="native")
+    found = diagnose(robot, [recorded(xml, hide, rng) for _ in range(2)]).diagnosis["findings"]
+    return {(f["effect"], *f["joints"]): next(iter(f["parameters"].values()))["value"] for f in found}
 
 
 def test_what_mujoco_itself_calls_friction_damping_and_armature_is_named():
-    rng = np.random.default_rng(0)
-    robot = robot_from_model(mujoco.MjModel.from_xml_string(SCARA), source="scara")
-    found = diagnose(robot, [recorded(rng) for _ in range(2)]).diagnosis["findings"]
-    values = {(f["effect"], *f["joints"]): next(iter(f["parameters"].values()))["value"] for f in found}
-    assert values == pytest.approx(HIDDEN, rel=0.03)
+    def hide(true):
+        true.dof_frictionloss[0], true.dof_damping[2] = 0.2, 25.0
+        true.dof_armature[1] += 0.04
+
+    friction = {("coulomb_friction", "shoulder"): 0.2, ("viscous_friction", "lift"): 25.0}
+    hidden = friction | {("rotor_inertia", "elbow"): 0.04}
+    assert named(SCARA, hide, 0) == pytest.approx(hidden, rel=0.03)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_friction_that_mujoco_turns_over_early_is_no_delay(seed):
+    def hide(true):
+        true.dof_frictionloss[0] = 1.0
+
+    assert named(PENDULUM, hide, seed) == pytest.approx({("coulomb_friction", "swing"): 1.0}, rel=0.01)
+
+
+def test_a_rotor_that_only_impossible_inertials_could_stand_for_is_named():
+    def hide(true):
+        true.dof_armature[0] += 0.25  # the link has 0.35 about the joint, known to 5 %
+
+    assert named(PENDULUM, hide, 0) == pytest.approx({("rotor_inertia", "swing"): 0.25}, rel=0.15)
+
+
+def test_a_payload_that_only_a_far_heavier_link_could_stand_for_is_named():
+    def hide(true):
+        true.body_mass[-1] *= 1.8
+
+    assert named(SCARA, hide, 0) == pytest.approx({("payload", "shoulder", "elbow", "lift"): 0.8 * 1.06}, rel=0.15)
