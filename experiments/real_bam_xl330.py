@@ -132,10 +132,15 @@ def stacked(recordings: Sequence[tuple[int, Recording]]) -> Run:
     return jax.tree.map(lambda *x: jnp.stack(x), *rows)
 
 
-def refitted(free: Sequence[str], bounds: Bounds, seen: Run, config: Config) -> list[Servo]:
-    """Servos whose simulation errs least on the runs seen, one for every start of the search, the best first."""
+def refitted(free: Sequence[str], bounds: Bounds, seen: Run, config: Config, near: Sequence[Servo] = ()) -> list[Servo]:
+    """Servos whose simulation errs least on the runs seen, one for every start of the search, the best first.
+
+    Searches begin at the data sheet, about it, and as near as the bounds allow to other servos: an optimum that was
+    found without bounds may have one within them that scattered starts miss.
+    """
     middle, rng = np.log([START[name] for name in free]), np.random.default_rng(config.seed)
     starts = [middle, *(middle + SCATTER * rng.normal(size=(config.starts - 1, len(free))))]
+    starts += [np.log([max(float(getattr(servo, name)), LEAST) for name in free]) for servo in near]
     found = [nearest_optimum(free, bounds, start, seen, config.evaluations) for start in starts]
     return sorted(found, key=lambda servo: float(jnp.mean(error(servo, seen))))
 
@@ -177,10 +182,10 @@ def run(config: Config) -> dict:
         free, finding = (*COULOMB_AND_VISCOUS, "load"), diagnosis["findings"][named.index("load_dependent_friction")]
         laws["with load-dependent friction, as named"] = (free, {})
         laws["the same, within what the torque says of it"] = (free, intervals(finding["parameters"]))
-    simulation = {
-        law: [judgement(servo, free, seen, judged) for servo in refitted(free, bounds, seen, config)]
-        for law, (free, bounds) in laws.items()
-    }
+    simulation, found = {}, []
+    for law, (free, bounds) in laws.items():
+        found = refitted(free, bounds, seen, config, found if bounds else ())
+        simulation[law] = [judgement(servo, free, seen, judged) for servo in found]
     return {
         **{key: diagnosis[key] for key in ("verdict", "summary", "findings", "unexplained", "fit")},
         "simulation": simulation, "goal": GOAL,

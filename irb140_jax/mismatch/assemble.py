@@ -61,7 +61,7 @@ def assemble(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data
     for c in lib.candidates:
         if c.effect.tied:
             moves = typical[c.columns] > 0.0
-            typical[c.columns] = np.min(typical[c.columns], where=moves, initial=np.inf) if moves.any() else 0.0
+            typical[c.columns] = np.where(moves, np.min(typical[c.columns], where=moves, initial=np.inf), 0.0)
     scale = np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
     loose = LooseInertials()
     extra = [
@@ -87,10 +87,14 @@ def problem(data: Data, noise: Noise, blocks: int = BLOCKS) -> tuple[Problem, Gr
     shapes: dict[tuple[str, tuple[int, ...]], int] = {}
     for c in data.candidates:
         shapes[c.slug, c.joints] = shapes.get((c.slug, c.joints), 0) + 1
-    n = data.stretches[0].y.shape[1]
-    rarer = lambda c: (LOOSE_PRIOR + LAST_PRIOR * (c.joints[0] == n - 1)) if c.slug == "inertials" else 0.0  # noqa: E731
+    # A payload whose mass the motion doesn't show can't be found: there the last link is like any other.
+    held = any(c.effect.tied and data.scale[data.nuisances + c.columns[0]] > 0.0 for c in data.candidates)
+    loose = np.full(data.stretches[0].y.shape[1], LOOSE_PRIOR)
+    loose[-1] += LAST_PRIOR if held else 0.0
     rare = np.array([
-        -np.log(sites * shapes[c.slug, c.joints] * c.effect.scanned) + rarer(c) for c in data.candidates
+        -np.log(sites * shapes[c.slug, c.joints] * c.effect.scanned)
+        + (loose[c.joints[0]] if c.slug == "inertials" else 0.0)
+        for c in data.candidates
     ])  # fmt: skip
     log_prior = np.where([c.effect.ordinary for c in data.candidates], -np.log(2.0), rare)
     width = max(len(c.columns) for c in data.candidates)
