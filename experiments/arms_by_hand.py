@@ -37,8 +37,8 @@ MuJoCo's own `frictionloss`, `damping`, `armature`, `stiffness` and `gravity` wh
 wrong, two recordings of 15 s that begin and end in motion, positions with 1e-5 of noise, torques with 1 %; effects of
 6 to 25 % of the joint's torque, inertials as they are; delays of 6 to 22 ms, lags of 15 to 60 ms, zeros off by 0.02 to
 0.06, payloads of 0.3 to 1 of the last link. Nothing is left out for being invisible: a zero of a vertical slide, or a
-gain where nothing but inertia acts, can't be seen by anyone. The loop holds its torque for 1 ms: beside hidden delays
-and lags that is a quarter of a millisecond more, in no truth, and far outside their intervals.
+gain where nothing but inertia acts, can't be seen by anyone. The loop holds its torque for 1 ms: beside hidden
+delays and lags that is a quarter of a millisecond more, in no truth, and far outside their intervals.
 """
 ARMS = {
     "pendulum": """<body pos="0 0 1"><joint name="swing" axis="0 1 0" range="-3 3" armature=".02"/>
