@@ -10,6 +10,7 @@ import pathlib
 from collections import Counter
 
 import jinja2
+import mlp_report
 import numpy as np
 import tables_1_2_arm
 import torque_swarms
@@ -69,6 +70,8 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm) -> str:
         torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking),
         tracking_seen=tracking_report.said_of_seen(tracking),
         network_table=network_table(network) if network else "",
+        network_seeds=mlp_report.by_seed(network["cases"]) if network else "",
+        near_singular=mlp_report.near_singular(network["cases"]) if network else "",
         others=other_arms(folder) if of.is_studys else [],
     )  # fmt: skip
 
@@ -211,6 +214,8 @@ def network_table(network: dict) -> str:
     """Position errors of every case."""
     lines = ["| case | weights | training, mm | validation, mm |", "|---" * 4 + "|", "| published | | 0.48 | 0.61 |"]
     for case in network["cases"]:
+        if case["case"]["seed"]:
+            continue
         lines.append(f"| {case['name']} | {case['weights']} | {case['training']:.3g} | {case['validation']:.3g} |")
     return "\n".join(lines)
 

@@ -16,9 +16,10 @@ def unseen_errors(model: CorrectedModel, case: ConcealedCase, noise: Noise) -> d
 
     Returns:
         "unseen": of the model.  "unseen_limit": of the same laws and shapes, with the inertials and amplitudes that fit
-        this very recording's torque best, joint by joint and without its noise: what no parameters could better.
-        "unseen_exact": of the model again, given the positions without the encoders' noise and rounding: what no
-        better smoother of positions could better.
+        this very recording's torque best, joint by joint and without its noise: what no
+        other inertials and amplitudes could better, with these laws and shapes.
+        "unseen_exact": of the model again, given the positions without the encoders' noise and rounding: what smoothing
+        positions better could not mend.
     """
     recording, log = case.recordings[-1], case.secret.logs[-1]
     true = np.stack([np.interp(recording.t, log.t, x) for x in log.tau.T], axis=1)

@@ -213,11 +213,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None:  # the process is ours
         keep_memory()
     try:
-        command = _parsed(argv)
-        from irb140_jax.compilation_cache import set_up_compilation_cache
-
-        set_up_compilation_cache()
-        command.run()
+        _run(argv)
     except InputError as error:
         print("irb140: " + " ".join(str(error).split()), file=sys.stderr)
         return 2
@@ -227,6 +223,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python would flush into the pipe at its end
         return 141
     return 0
+
+
+def _run(argv: Sequence[str] | None) -> None:
+    try:
+        command = _parsed(argv)
+        from irb140_jax.compilation_cache import set_up_compilation_cache
+
+        set_up_compilation_cache()
+        command.run()
+    finally:
+        sys.stdout.flush()  # here, where a pipe that nobody reads is an exception; at Python's end it is a complaint
 
 
 def _parsed(argv: Sequence[str] | None) -> Diagnose | Predict | Demo | Excite:

@@ -235,14 +235,16 @@ def test_a_run_that_breaks_off_leaves_a_former_diagnosis_as_it_was(recording, tm
     assert sorted(path.name for path in tmp_path.iterdir()) == ["d", "in"]
 
 
-def test_a_reader_that_stops_leaves_no_traceback():
+@pytest.mark.parametrize("buffered", [True, False])
+def test_a_reader_that_stops_leaves_no_traceback(buffered):
+    env = {**os.environ, "PYTHONUNBUFFERED": "" if buffered else "1"}
     code = "import sys; from irb140_jax.cli import main; sys.exit(main())"
     reader, writer = os.pipe()
     os.close(reader)
-    done = subprocess.run([sys.executable, "-c", code, "--help"], stdout=writer, stderr=subprocess.PIPE, text=True)
+    command = [sys.executable, "-c", code, "--help"]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, env=env)
     os.close(writer)
     assert done.returncode == 141 and not done.stderr
-
 
 
 def test_predict_writes_one_row_per_row_with_the_columns_of_the_contract(recording, table, tmp_path, stub):

@@ -194,7 +194,7 @@ def motion(seed=0, samples=60, rest_speed=RESTING):
     rigid = rigid_body(rng, samples)
     speeds = jnp.full(len(KINDS), rest_speed)
     direction = jnp.tanh(arrays[1] / speeds)
-    near_rest = {"rest_speed": speeds, "direction": direction, "turning": jnp.asarray(jnp.gradient(direction, axis=0))}
+    near_rest = {"rest_speed": speeds, "direction": direction}
     return Motion(jnp.arange(samples) / 20.0, *arrays, rigid=rigid, **near_rest, recording=jnp.array(0.0))
 
 
@@ -492,7 +492,7 @@ def test_what_mjcf_expresses_is_the_same_in_the_model_as_beside_it(effect):
     q, qd, qdd = rng.normal(size=(3, 5, 1))
     tau = [np.stack([dynamics.inverse_dynamics(arm, *x) for x in zip(q, qd, qdd, strict=True)]) for arm in arms]
     arrays = [jnp.asarray(x) for x in (q, qd, qdd, q, q, q, q, q)]
-    near_rest = {"rest_speed": jnp.full(1, RESTING), "direction": jnp.sign(arrays[1]), "turning": 0 * arrays[1]}
+    near_rest = {"rest_speed": jnp.full(1, RESTING), "direction": jnp.sign(arrays[1])}
     m = Motion(jnp.arange(5.0), *arrays, rigid=rigid_body(rng, 5), **near_rest, recording=jnp.array(0.0))
     w, shape = effect.amplitudes({effect.parameters[0].name: 0.7})
     torque = effect.columns(m, jnp.arange(1), jnp.asarray(shape))[:, 0] @ w

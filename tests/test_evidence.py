@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy import signal, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.along import Stretch
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.evidence import eliminated, gain_of, gains, grams, layouts, posterior
 from irb140_jax.mismatch.noise import ORDER, Noise, noise_from_residuals
+from irb140_jax.mismatch.rows import Stretch
 
 LAGS = 3  # coefficients of the whitening filter here, the row's own among them
 JOINTS, NUISANCES, AMPLITUDES = 2, 4, 5
@@ -31,7 +31,7 @@ def stretches(seed: int, rows: int = 70, recordings: int = 2) -> list[Stretch]:
         use = np.ones((rows, JOINTS), dtype=bool)
         use[20:24, 0] = False
         zero = np.zeros((rows, JOINTS))
-        out.append(Stretch(r, np.arange(rows) / 50.0, 0.0, X, y, y, zero, use, zero, zero, zero, zero, zero))
+        out.append(Stretch(r, np.arange(rows) / 50.0, 0.0, X, y, X, y, zero, use, zero, zero, zero, zero, zero))
     return out
 
 

@@ -204,6 +204,11 @@ def test_the_experiment_is_made_whole_and_is_not_repeated(tmp_path):
     assert first.returncode == 0, first.stderr
     table = json.loads((tmp_path / "mlp_kinematics_smoke.json").read_text())
     assert all(np.isfinite(row["validation"]) for row in table["cases"])
+    by_seed = {row["case"]["seed"]: row for row in table["cases"] if row["reading"] == "inverse, branch, 4 x 122, MAE"}
+    assert by_seed[0]["validation"] != by_seed[1]["validation"]
+    said = (tmp_path / "mlp_kinematics_smoke.md").read_text()
+    mean = np.mean([row["bins"][-1]["chosen_p95"] for row in by_seed.values()])
+    assert "| none | 2 | 0 | " in said and f" {mean:.3g} [" in said
     assert (tmp_path / "figures" / "figure12.svg").exists()
     again = run()
     assert "epoch" not in again.stdout.split("#")[0]

@@ -38,12 +38,31 @@ def test_friction_has_all_of_it_to_overcome():
     assert PREFER < more < hurdle and not done
 
 
-def test_physics_takes_the_place_of_an_early_turnover_at_even_odds():
-    turnover, delay = ("turnover", (0,), [NEAR]), ("time_delay", (0,), [WAVE])
-    there = problem([FRICTION, turnover, delay], (50.0 * TURNS + 0.6 * WAVE)[None], shapes=(2,))
+def test_physics_takes_the_place_of_soft_friction_at_even_odds():
+    soft, delay = ("soft_friction", (0,), [NEAR]), ("time_delay", (0,), [WAVE])
+    there = problem([FRICTION, soft, delay], (50.0 * TURNS + 0.6 * WAVE)[None], shapes=(2,))
     more = there.odds((0,), (2,)) - there.odds((0,), (1,))
     assert 0.0 < more < PREFER
     assert _exchange(there, (0, 1), (0, 1), frozenset()) == (0, 2)
+
+
+def test_soft_friction_stands_beside_dry_friction_or_not_at_all():
+    there = problem([FRICTION, ("soft_friction", (0,), [WAVE]), ("stribeck_friction", (0,), [NEAR])], WAVE[None])
+    assert [bool(name.conflicts(there, chosen)[1]) for chosen in ((), (0,), (2,))] == [True, False, False]
+
+
+@pytest.mark.parametrize("bend, left", [(0.02, {0, 2}), (1.0, {0, 1})])
+def test_ordinary_friction_takes_the_place_of_a_law_that_is_not_clearly_better(bend, left):
+    bent = TURNS + bend * WAVE
+    laws = [("viscous_friction", (0,), [NEAR]), ("nonlinear_viscous_friction", (0,), [bent]), FRICTION]
+    there = problem(laws, (10.0 * bent + NEAR)[None], shapes=(1,))
+    assert there.odds((0,), (1,)) > there.odds((0,), (2,))
+    assert set(name._settled(there, (0, 1))) == left
+
+
+def test_a_step_that_settling_undoes_does_not_end_the_growth(monkeypatch):
+    monkeypatch.setattr(name, "_settled", lambda _, chosen, *__: tuple(c for c in chosen if c != 0))
+    assert name._grown(problem([SPRING, FRICTION], (9.0 * WAVE + 5.0 * TURNS)[None]), ()) == (1,)
 
 
 def test_rules_that_undo_each_other_end_at_once(monkeypatch):

@@ -18,6 +18,10 @@ SCARA = HEAD + """<body pos="0 0 .3"><joint name="shoulder" axis="0 0 1" range="
   <body pos=".2 0 0"><joint name="lift" type="slide" axis="0 0 -1" range="0 .2" armature="1.5"/>
    <geom type="cylinder" size=".012 .15" density="7800"/>
 </body></body></body></worldbody></mujoco>"""
+CYLINDRICAL = HEAD + """<body pos="0 0 .3"><joint name="turn" axis="0 0 1" range="-2.5 2.5" armature=".05"/>
+ <geom type="box" size=".15 .05 .1" pos=".1 .02 0" density="1500"/>
+ <body pos=".1 0 0"><joint name="reach" type="slide" axis="1 0 0" range="0 .4" armature="1"/>
+  <geom type="capsule" fromto="0 0 0 .4 0 0" size=".04" density="2500"/></body></body></worldbody></mujoco>"""
 PENDULUM = HEAD + """<body pos="0 0 1"><joint name="swing" axis="0 1 0" range="-3 3" armature=".02"/>
  <geom type="capsule" fromto="0 0 0 0 0 -.5" size=".03" density="2700"/></body></worldbody></mujoco>"""
 
@@ -82,6 +86,26 @@ def test_friction_that_mujoco_turns_over_early_is_no_delay(seed):
         true.dof_frictionloss[0] = 1.0
 
     assert named(PENDULUM, hide, seed) == pytest.approx({("coulomb_friction", "swing"): 1.0}, rel=0.01)
+
+
+@pytest.mark.parametrize("friction", [1.5, 4.0])
+def test_friction_under_which_mujoco_lets_a_slide_creep_is_no_stribeck(friction):
+    def hide(true):
+        true.dof_frictionloss[2], true.dof_damping[2] = friction, 8.0
+
+    hidden = {("coulomb_friction", "lift"): friction, ("viscous_friction", "lift"): 8.0}
+    assert named(SCARA, hide, 0) == pytest.approx(hidden, rel=0.03)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_gravity_that_leans_on_links_known_roughly_comes_without_a_spring(seed):
+    def hide(true):
+        true.opt.gravity[:] = 9.81 * np.array([0.06, -0.06, -1.0])
+        true.body_ipos[1, :2] += [-0.015, 0.02]
+
+    # Nothing but leaning gravity shows where the first link's mass is.
+    expected = {("gravity_tilt", "turn", "reach"): 0.06 * np.sqrt(2.0)}
+    assert named(CYLINDRICAL, hide, seed) == pytest.approx(expected, rel=0.02)
 
 
 def test_a_rotor_that_only_impossible_inertials_could_stand_for_is_named():

@@ -31,6 +31,9 @@ class ActuatorLag(AbstractEffect):
     def columns(self, motion, joints, shape):
         return of_site(motion.scaled_rate, joints)[:, :, None]
 
+    def passed_on(self, x, dt, w, shape):
+        return w[0] * np.gradient(x, dt, axis=0)
+
     def memory(self, q, tau):
         return tau
 

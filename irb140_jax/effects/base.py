@@ -60,7 +60,6 @@ class Motion(eqx.Module):
         rigid: What the rigid body does along the motion.
         rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
         direction: sign(qd), and between two signs what friction does while a joint sticks, shape (T, n).
-        turning: Time derivative of the direction, shape (T, n).
         recording: Number of the recording, from 0; below 0 for motion that the diagnosis did not see, shape ().
     """
 
@@ -76,7 +75,6 @@ class Motion(eqx.Module):
     rigid: "RigidBody"
     rest_speed: Joints
     direction: JointSamples
-    turning: JointSamples
     recording: Scalar
 
 
@@ -133,6 +131,7 @@ class AbstractEffect(abc.ABC):
         scanned: From how many shapes a scout picks the best: what chance has as many tries at.
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
         tied: Its amplitudes are of one order of size: what the data can't see of one, the others bound.
+        alters: Slug of the law that it alters: it stands beside that, or one that contains it, or not at all.
         silent: It competes with what was left out, and is not that: no finding bears its name.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
@@ -166,6 +165,7 @@ class AbstractEffect(abc.ABC):
     scanned: ClassVar[int] = 1
     adds_up: ClassVar[bool] = False
     tied: ClassVar[bool] = False
+    alters: ClassVar[str | None] = None
     silent: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)
     history: ClassVar[str | None] = None
@@ -283,6 +283,19 @@ class AbstractEffect(abc.ABC):
             Columns at this instant, the torque that the drives really give, and the memory after the step.
         """
         raise NotImplementedError(f"{self.slug} can't be simulated forward in time")
+
+    def passed_on(self, x: np.ndarray, dt: float, w: np.ndarray, shape: np.ndarray) -> np.ndarray:
+        """What a law of the log makes of any torque x beside that torque itself, shape (T, any) like x.
+
+        Only of an effect that is `logged`.
+
+        Args:
+            x: Torques before it, shape (T, any).
+            dt: Between samples [s].
+            w: Amplitudes of all columns, shape (k,).
+            shape: Shape parameters, shape (s,).
+        """
+        raise NotImplementedError(f"{self.slug} is no law of the log")
 
     def in_model(self, robot: Robot, joints: tuple[int, ...], w: np.ndarray, shape: np.ndarray) -> Robot:
         """The robot with as much of this effect in its own numbers as those, and so MJCF, can hold.

@@ -42,6 +42,10 @@ class TimeDelay(AbstractEffect):
         late = jax.vmap(lambda x: jnp.interp(motion.t + shape[0], motion.t, x), in_axes=1, out_axes=1)
         return late(motion.asked_rate)[:, :, None]
 
+    def passed_on(self, x, dt, w, shape):
+        t, slope = dt * np.arange(len(x)), np.gradient(x, dt, axis=0)
+        return w[0] * np.stack([np.interp(t + shape[0], t, s) for s in slope.T], axis=1)
+
     def physical(self, w, shape):
         return w
 

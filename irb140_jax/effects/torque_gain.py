@@ -30,6 +30,9 @@ class TorqueGain(AbstractEffect):
     def columns(self, motion, joints, shape):
         return of_site(motion.total, joints)[:, :, None]
 
+    def passed_on(self, x, dt, w, shape):
+        return w[0] * x
+
     def physical(self, w, shape):
         return 1.0 / (1.0 + w)
 

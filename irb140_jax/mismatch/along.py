@@ -1,6 +1,5 @@
-"""What a robot and every candidate do along a recording: sensitivities, columns, and both through the low-pass."""
+"""What a robot and every candidate do along a recording: sensitivities and columns."""
 
-import dataclasses
 from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
@@ -18,7 +17,6 @@ from irb140_jax.effects import Motion, RigidBody, Scales
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.mismatch.candidates import Library
 from irb140_jax.recordings.condition import Conditioned
-from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot, about_origin
 from irb140_jax.types import JointSamples
 
@@ -167,7 +165,7 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
     load, total, carried, scaled, asked = loads or (nominal, nominal, nominal - along.motor_side, nominal, nominal)
     dt = float(np.mean(np.diff(r.t)))
     rates = np.gradient(scaled, dt, axis=0), np.gradient(asked, dt, axis=0)
-    near_rest = (r.rest_speed, r.direction, np.gradient(r.direction, dt, axis=0))
+    near_rest = (r.rest_speed, r.direction)
     moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, *rates, along.rigid, *near_rest)
     which = np.array(float(recording))
     whole = Motion(*moving, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
@@ -204,63 +202,3 @@ def _columns(effects, motion, sites, shapes):
 def _friction(robot: Robot, r: Conditioned) -> np.ndarray:
     """The model's own friction, with the sign of qd rounded off as in the candidates."""
     return np.asarray(robot.damping) * r.qd + np.asarray(robot.frictionloss) * r.direction
-
-
-@dataclasses.dataclass(frozen=True)
-class Stretch:
-    """A stretch of one recording, low-passed: for each joint its rows of all columns and of the torque residual.
-
-    Attributes:
-        recording: Index of the recording it belongs to.
-        t: Time of the rows [s], shape (R,).
-        begin: Time at which the recording begins [s].
-        X: Columns [inertials | amplitudes | loose inertials] per joint, (R, n, 10 n + size + 10 n); inertials twice, in
-            units of their prior at relative standard deviation 1.
-        y: Logged minus nominal torque per joint, (R, n).
-        tau: Logged torque, low-passed, (R, n).
-        nominal: Nominal torque, low-passed, (R, n).
-        use: Rows in which the joint moves and nothing is lost, (R, n).
-        q, qd, qdd: Motion at the rows, (R, n), for maps and the flexible competitor.
-        tool, tool_jacobian: Where the tool is and how joints move it, (R, 3) and (R, n, 3); see `RigidBody`.
-    """
-
-    recording: int
-    t: np.ndarray
-    begin: float
-    X: np.ndarray
-    y: np.ndarray
-    tau: np.ndarray
-    nominal: np.ndarray
-    use: np.ndarray
-    q: np.ndarray
-    qd: np.ndarray
-    qdd: np.ndarray
-    tool: np.ndarray
-    tool_jacobian: np.ndarray
-
-
-def stretch(
-    lib: Library, along: Prepared, index: int, band: Band, factor: np.ndarray, loads: Loads | None = None
-) -> Stretch:
-    """All columns of a recording through the common low-pass, at the kept samples.
-
-    Args:
-        lib: The library.
-        along: The recording.
-        index: Its number.
-        band: Of the comparison.
-        factor: Square root of the inertial prior, shape (10 n, 10 n).
-        loads: See `columns_along`.
-    """
-    Y, nominal, _, columns = columns_along(lib, along, loads, index)
-    recording, k = along.recording, len(factor)
-    kept = band.kept(len(recording.t))
-    nominal, tau = band.apply(nominal), band.apply(recording.tau)
-    X = np.zeros((len(kept), lib.robot.n, k + lib.size + k))
-    X[..., :k] = X[..., -k:] = band.apply(Y) @ factor
-    lib.spread(band.apply(columns), X[..., k:-k])
-    return Stretch(
-        index, recording.t[kept], recording.began, X, tau - nominal, tau, nominal, recording.usable[kept],
-        recording.q[kept], recording.qd[kept], recording.qdd[kept],
-        np.asarray(along.rigid.tool)[kept], np.asarray(along.rigid.tool_jacobian)[kept],
-    )  # fmt: skip

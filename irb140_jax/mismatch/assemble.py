@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 
-from irb140_jax.mismatch.along import Stretch
 from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.evidence import Grams, eliminated, grams
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.problem import Problem
+from irb140_jax.mismatch.rows import Stretch
 from irb140_jax.mismatch.silent import LooseInertials
 
 TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a share of the joint's torque
@@ -125,9 +125,11 @@ def first_noise(data: Data) -> Noise:
     use = [s.use for s in data.stretches]
     residuals = [np.zeros_like(s.y) for s in data.stretches]
     dof = np.zeros(n)
+    # What is no physics repeats the inertials and friction; so many columns more would only blur the estimate.
+    silent = np.concatenate([data.nuisances + c.columns for c in data.candidates if c.effect.silent])
     for j in range(n):
         keep = np.any([np.any(s.X[:, j] != 0.0, axis=0) for s in data.stretches], axis=0) & (data.scale > 0)
-        keep[-data.nuisances :] = False  # the loose inertials repeat the inertials
+        keep[silent] = False
         A = np.concatenate([s.X[s.use[:, j], j][:, keep] * data.scale[keep] for s in data.stretches])
         y = np.concatenate([s.y[s.use[:, j], j] for s in data.stretches])
         if len(y) < 10:

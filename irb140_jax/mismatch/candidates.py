@@ -70,6 +70,14 @@ class Library:
             amplitudes.append(np.broadcast_to(amplitude, (S, G, m, width)).ravel())
         return np.concatenate(joints), np.concatenate(amplitudes)
 
+    @cached_property
+    def in_log(self) -> np.ndarray:
+        """Which of these columns are of laws of the log."""
+        laws = np.zeros(self.size, dtype=bool)
+        for effect, _, _, first in self.blocks:
+            laws[first:] = effect.logged > 0
+        return laws[self.entries[1]]
+
     def spread(self, entries: np.ndarray, out: np.ndarray) -> None:
         """Write the non-zero columns, (T, entries), into zeros by joint and amplitude, (T, n, size)."""
         joints, amplitudes = self.entries

@@ -223,7 +223,7 @@ def _torque(
         rigid = cast(RigidBody, sensed)  # it has the same names, and derives what is asked for
         new = jnp.array(-1.0)  # no recording of the diagnosis
         moving = (since, q, qd, qdd, load, total, carried, rate(scaled), rate(asked), rigid)
-        motion = Motion(*moving, robot.rest_speed, direction, rate(direction), new)
+        motion = Motion(*moving, robot.rest_speed, direction, new)
         return robot.summed(motion, base, stepped)
 
     # Twice, as in the fit: columns that depend on the load see the corrected one the second time.

@@ -16,9 +16,9 @@ from functools import partial
 import numpy as np
 from scipy import linalg
 
-from irb140_jax.mismatch.along import Stretch
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.noise import Noise
+from irb140_jax.mismatch.rows import Stretch
 
 WIDENINGS = 10  # rounds in which the priors of strong effects become as wide as those; three or four are usual
 ROUNDING = 1e-12  # relative; a log of nonsense can make columns that are equal to a dozen digits

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from irb140_jax.effects import AbstractEffect, Scales
-from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by, stretch
+from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
 from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble, first_noise, problem
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
@@ -15,8 +15,10 @@ from irb140_jax.mismatch.name import guessed, search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.problem import Problem
+from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
-from irb140_jax.mismatch.silent import Turnover
+from irb140_jax.mismatch.silent import SoftFriction
+from irb140_jax.mismatch.tangent import Point, point
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
@@ -77,18 +79,20 @@ def explain(
         uncertainty: Relative standard deviation of the inertials.
         progress: Told what is being done.
     """
-    factor, effects = inertial_prior_factor(robot, 1.0), (*effects, Turnover())
+    factor, effects = inertial_prior_factor(robot, 1.0), (*effects, SoftFriction())
     progress("rigid body along the recordings")
     along = [prepared(robot, r) for r in recordings]
     scales = scales_of(along)
     lib = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     loads: list[Loads | None] = [None] * len(recordings)
+    at: Point | None = None
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
 
     def explained(turn: int, blocks: int) -> Explanation:
         progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
-        rows = [stretch(lib, r, i, band, factor, load) for i, (r, load) in enumerate(zip(along, loads, strict=True))]
+        both = zip(along, loads, strict=True)
+        rows = [stretch(lib, r, i, band, factor, load, at) for i, (r, load) in enumerate(both)]
         data = assemble(lib, rows, uncertainty)
         progress(f"searching sets of explanations (round {turn})")
         return _settled(lib, scales, data, factor, chosen, noise, blocks)
@@ -96,8 +100,9 @@ def explain(
     for turn in range(1, PASSES):
         ex = explained(turn, blocks=1)
         found = fitted(ex.data, full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), ex.chosen, factor)
-        better = _better_known(robot, found)
-        along = [seen_by(better, r) for r in along]
+        named = _named(found)
+        better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), named)
+        along, at = [seen_by(better, r) for r in along], point(robot, found[0], named)
         loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
         (lib, chosen), noise = _refined(ex), ex.noise
         del ex  # hundreds of megabytes, before the next
@@ -151,11 +156,10 @@ def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -
     return noise_from_residuals(residuals, [s.use for s in data.stretches], np.full(n, used / n))
 
 
-def _better_known(robot: Robot, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> Robot:
-    """What an explanation (see `fitted`) says of the robot."""
-    dphi, members, amplitudes = found
-    named = [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
-    return better_known(robot, np.asarray(robot.phi) + dphi.reshape(-1, 10), named)
+def _named(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
+    """The effects of an explanation (see `fitted`) with their numbers."""
+    _, members, amplitudes = found
+    return [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
 
 
 def _loads(lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]], r: Prepared, index: int) -> Loads:

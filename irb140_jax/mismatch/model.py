@@ -45,6 +45,13 @@ class Named:
         return full
 
 
+def as_named(robot: Robot, named: Sequence[Named]) -> Robot:
+    """The robot with as much of the effects in its own numbers as those can hold."""
+    for n in named:
+        robot = n.effect.in_model(robot, n.joints, n.all_amplitudes(), n.shape)
+    return robot
+
+
 def better_known(robot: Robot, phi: np.ndarray, named: Sequence[Named]) -> Robot:
     """The robot whose slopes over position and speed shape the effects: refitted inertials, and the springs named.
 
@@ -56,9 +63,7 @@ def better_known(robot: Robot, phi: np.ndarray, named: Sequence[Named]) -> Robot
         phi: Inertial parameters, shape (n, 10).
         named: The effects.
     """
-    sprung = robot
-    for n in named:
-        sprung = n.effect.in_model(sprung, n.joints, n.all_amplitudes(), n.shape)
+    sprung = as_named(robot, named)
     springs = lambda r: (r.stiffness, r.springref)  # noqa: E731
     return eqx.tree_at(springs, with_phi(robot, jnp.asarray(phi)), springs(sprung))
 

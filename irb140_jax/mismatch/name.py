@@ -71,7 +71,7 @@ def _joined(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
 
 def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = frozenset()) -> tuple[int, ...]:
     """Add the best candidate, settle around it, and again, until none is worth adding."""
-    seen: set[frozenset[int]] = set()
+    seen = {frozenset(chosen)}
     while len(chosen) < MOST:
         scores = problem.scores(chosen) + problem.entry
         scores = scores - problem.feigned(chosen, scores) - ACCEPT
@@ -80,22 +80,29 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
         best = int(np.argmax(scores))
         if scores[best] <= 0:
             break
-        chosen = _settled(problem, (*chosen, best), set(problem.candidates[best].joints), banned)
-        if frozenset(chosen) in seen:
-            break  # adding and settling undo each other
+        c = problem.candidates[best]
+        grown = _settled(problem, (*chosen, best), set(c.joints), banned)
+        if frozenset(grown) in seen:
+            # Adding and settling undo each other: no shape of it gets any further.
+            banned |= frozenset(i for i, o in enumerate(problem.candidates) if (o.slug, o.joints) == (c.slug, c.joints))
+            continue
+        chosen = grown
         seen.add(frozenset(chosen))
     return chosen
 
 
 def conflicts(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
-    """Candidates that can't stand beside the set: the same effect at the site, or one that absorbs the other."""
+    """Candidates that can't stand beside the set: the effect itself, what absorbs it, what alters nothing there."""
     taken: dict[tuple[int, ...], set[str]] = defaultdict(set)
     absorbed: dict[tuple[int, ...], set[str]] = defaultdict(set)
+    means: dict[tuple[int, ...], set[str]] = defaultdict(set)
     for c in (problem.candidates[i] for i in chosen):
         taken[c.joints].add(c.slug)
         absorbed[c.joints] |= _absorbed(c)
+        means[c.joints] |= {c.slug, *c.effect.contains}
     return np.array([
         c.slug in taken[c.joints] | absorbed[c.joints] or bool(_absorbed(c) & taken[c.joints])
+        or (c.effect.alters is not None and c.effect.alters not in means[c.joints])
         for c in problem.candidates
     ])  # fmt: skip
 
@@ -185,7 +192,7 @@ def _simplify(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) 
 
 
 def simpler(problem: Problem, d: int) -> list[tuple[int, ...]]:
-    """What could stand for a law: its special cases, itself with fewer columns, or ordinary friction with as many."""
+    """What could stand for a law: its special cases, itself with fewer columns, or ordinary friction, no more of it."""
     member = problem.candidates[d]
     if member.effect.ordinary:
         return []
@@ -196,10 +203,11 @@ def simpler(problem: Problem, d: int) -> list[tuple[int, ...]]:
         if c.slug in member.effect.contains
         or (c.slug == member.slug and len(c.columns) < len(member.columns) and np.array_equal(c.shape, member.shape))
     ]
+    if not member.effect.friction:
+        return fewer
     ordinary = tuple(i for i, c in at_site if c.effect.ordinary)
-    if member.effect.friction and 1 < len(ordinary) <= _size(member):
-        fewer.append(ordinary)
-    return fewer
+    one = [(i,) for i in ordinary if (i,) not in fewer]
+    return [*fewer, *one, *([ordinary] if 1 < len(ordinary) <= _size(member) else [])]
 
 
 def _size(c: Candidate) -> int:

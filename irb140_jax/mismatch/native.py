@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.mismatch.consistent import consistent
-from irb140_jax.mismatch.model import CorrectedModel, Named
+from irb140_jax.mismatch.model import CorrectedModel, Named, as_named
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
 
 XML, NOTES = "corrected.xml", "corrected.md"
@@ -19,10 +19,7 @@ def native_robot(model: CorrectedModel) -> Robot:
     gear, which holds the torque constants found wrong.
     """
     phi = consistent(model.phi_corrected, np.asarray(model.robot.phi))
-    robot = with_phi(model.robot, jnp.asarray(phi))
-    for named in model.named:
-        robot = named.effect.in_model(robot, named.joints, named.all_amplitudes(), named.shape)
-    return robot
+    return as_named(with_phi(model.robot, jnp.asarray(phi)), model.named)
 
 
 def save_native(model: CorrectedModel, folder: pathlib.Path) -> None:

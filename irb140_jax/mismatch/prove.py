@@ -86,7 +86,7 @@ class Refit:
 def refitted(ex: Explanation) -> Refit:
     """Refit the inertials; links that the explanation found wrong beyond their stated uncertainty are free here too."""
     columns = ex.columns(tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials"))
-    stretches = [dataclasses.replace(s, X=s.X[..., columns]) for s in ex.data.stretches]
+    stretches = [s.of_rigid_body(columns) for s in ex.data.stretches]
     noise, scale = ex.noise, ex.data.scale[columns]
     for _ in range(2):
         w = posterior(grams(stretches, noise, scale, len(columns), 1).total(), np.arange(len(columns))).mean
@@ -99,21 +99,21 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     """Residuals of the rival models, each row predicted from the other recordings (or blocks)."""
     data, energy = ex.data, _energy(ex, ex.chosen)
     seen = full_posterior(data, ex.problem, ex.grams, ex.chosen).mean
-    out = {name: [s.y.copy() for s in data.stretches] for name in ("refit", "corrected")}
+    bare = [s.of_rigid_body(refit.columns) for s in data.stretches]
+    out = {"refit": [s.y.copy() for s in bare], "corrected": [s.y.copy() for s in data.stretches]}
     for fold in folds(ex):
         unseen = full_posterior(data, ex.problem, ex.grams, ex.chosen, fold).mean
-        fits = {
-            "refit": (refit.columns, refit.posterior(fold).mean),
-            "corrected": (ex.columns(), np.where(_only_here(ex, ex.chosen, energy, fold), seen, unseen)),
-        }
+        corrected = np.where(_only_here(ex, ex.chosen, energy, fold), seen, unseen)
+        means = {"refit": refit.posterior(fold).mean * data.scale[refit.columns]}
+        means["corrected"] = corrected * data.scale[ex.columns()]
         for r, s in enumerate(data.stretches):
             mine = fold[ex.grams.recording == s.recording]
             edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
             for b in np.flatnonzero(mine):
                 rows = slice(edges[b], edges[b + 1])
-                for name, (columns, mean) in fits.items():
-                    out[name][r][rows] -= s.X[rows][..., columns] @ (mean * data.scale[columns])
-    nominal = [s.y for s in data.stretches]
+                out["refit"][r][rows] -= bare[r].X[rows] @ means["refit"]
+                out["corrected"][r][rows] -= s.X[rows][..., ex.columns()] @ means["corrected"]
+    nominal = [s.tau - s.nominal for s in data.stretches]
     level = np.sqrt(np.mean(ex.noise.total**2, axis=0))
     return HeldOut(nominal, out["refit"], out["corrected"], [s.use for s in data.stretches], level)
 

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.along import prepared, stretch
+from irb140_jax.mismatch.along import prepared
 from irb140_jax.mismatch.assemble import LOOSE_STD
 from irb140_jax.mismatch.candidates import Library
 from irb140_jax.mismatch.evidence import eliminated, gain_of, grams, posterior
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
+from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.testable import played, stands_out
 from irb140_jax.mismatch.undecided import Pair, Sets, Undecided
 from irb140_jax.recordings.excite import Excitation

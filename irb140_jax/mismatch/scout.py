@@ -5,10 +5,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from irb140_jax.effects import AbstractEffect, LeftOver, Scales
-from irb140_jax.mismatch.along import Prepared, Stretch, stretch
+from irb140_jax.mismatch.along import Prepared
 from irb140_jax.mismatch.assemble import Data, assemble
 from irb140_jax.mismatch.candidates import Library, library, reshaped
 from irb140_jax.mismatch.evidence import layouts
+from irb140_jax.mismatch.rows import Stretch, stretch
 from irb140_jax.recordings.low_pass import Band
 
 THIN = 2  # every second of them in a scan; the search then sees all rows

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from irb140_jax.mismatch.along import Stretch
 from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.prove import HeldOut
+from irb140_jax.mismatch.rows import Stretch
 
 FEATURES = 60  # random Fourier features a competitor
 SHIFTS = 99  # circular time shifts that make the null

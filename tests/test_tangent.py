@@ -1,0 +1,115 @@
+"""Columns are slopes of the corrected model's torque at the last explanation, whatever multiplies what."""
+
+import numpy as np
+import pytest
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.along import columns_along, prepared, seen_by
+from irb140_jax.mismatch.model import CorrectedModel, Named, better_known, composed, library_of
+from irb140_jax.mismatch.rows import stretch
+from irb140_jax.mismatch.tangent import point
+from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.recording import Recording
+from irb140_jax.robot import first_joints, irb140
+
+ROBOT = first_joints(irb140(), 3)
+N = ROBOT.n
+FOUND = (
+    ("coulomb_friction", (0,), [3.0], []),
+    ("gravity_tilt", (0, 1, 2), [0.03, -0.02], []),
+    ("torque_gain", (1,), [0.15], []),
+    ("actuator_lag", (0,), [0.04], []),
+    ("actuator_lag", (1,), [0.02], []),
+    ("time_delay", (0, 1, 2), [0.008], [0.004]),
+)
+
+
+def recording() -> Recording:
+    """A smooth motion of 6 s; what torque was logged does not matter."""
+    t = np.arange(0.0, 6.0, 0.002)
+    wave = lambda rate, phase: np.sin(2.0 * np.pi * rate * t + phase)  # noqa: E731
+    q = np.stack([0.5 * wave(0.4 + 0.1 * j, j) + 0.2 * wave(1.1, 2.0 * j) for j in range(N)], axis=1)
+    return Recording(t, q, 10.0 * q, ROBOT.joint_names, source="tangent")
+
+
+LOG = recording()
+BAND = choose_band([LOG], ROBOT)
+SMOOTH = condition(LOG, BAND)
+
+
+def found_model(dphi: np.ndarray, amplitudes: list[np.ndarray]) -> CorrectedModel:
+    """What was found, with these numbers."""
+    effects = tuple(
+        Named(CATALOGUE[slug], joints, tuple(range(len(w))), np.array(w, dtype=float), np.array(shape))
+        for (slug, joints, _, shape), w in zip(FOUND, amplitudes, strict=True)
+    )
+    phi = np.asarray(ROBOT.phi)
+    return CorrectedModel(ROBOT, phi, phi + dphi.reshape(N, 10), effects, BAND, SMOOTH.rest_speed)
+
+
+def settled(model: CorrectedModel):
+    """Library, recording and torques of a model, its loads those that it makes itself."""
+    lib, dphi = library_of(model), (model.phi_corrected - np.asarray(ROBOT.phi)).ravel()
+    along = seen_by(better_known(ROBOT, model.phi_corrected, model.named), prepared(ROBOT, SMOOTH))
+    loads = None
+    for _ in range(6):  # a gain, a lag and a delay one after the other
+        torques = composed(lib, columns_along(lib, along, loads), lib.candidates, amplitudes_of(model), dphi, dphi)
+        loads = torques.loads
+    return lib, along, torques
+
+
+def amplitudes_of(model: CorrectedModel) -> list[np.ndarray]:
+    return [n.amplitudes for n in model.named]
+
+
+def explained_by(there):
+    """A model with inertials off and these of the effects, its settled torques, and the rows taken at it."""
+    dphi = 0.05 * np.abs(np.asarray(ROBOT.phi)).ravel() * np.random.default_rng(0).normal(size=10 * N)
+    model = found_model(dphi, [there(k) * np.array(w) for k, (_, _, w, _) in enumerate(FOUND)])
+    lib, along, torques = settled(model)
+    at = point(ROBOT, dphi, model.named)
+    return model, dphi, torques, stretch(lib, along, 0, BAND, np.eye(10 * N), torques.loads, at)
+
+
+@pytest.fixture(scope="module")
+def explained():
+    """With all of them."""
+    return explained_by(lambda _: True)
+
+
+def coefficients(dphi: np.ndarray, amplitudes: list[np.ndarray]) -> np.ndarray:
+    return np.concatenate([dphi, *amplitudes, np.zeros(10 * N)])
+
+
+def test_at_its_own_point_the_rows_leave_what_the_model_leaves(explained):
+    model, dphi, torques, rows = explained
+    left = rows.y - rows.X @ coefficients(dphi, amplitudes_of(model))
+    np.testing.assert_allclose(left, BAND.apply(SMOOTH.tau - torques.corrected), atol=1e-6)
+
+
+@pytest.mark.parametrize("which", ["inertials", *range(len(FOUND))])
+def test_columns_are_slopes_of_the_torque(explained, which):
+    model, dphi, torques, rows = explained
+    if which != "inertials" and CATALOGUE[FOUND[which][0]].logged:
+        model, dphi, torques, rows = explained_by(lambda k: k == which or not CATALOGUE[FOUND[k][0]].logged)
+    amplitudes = [a.copy() for a in amplitudes_of(model)]
+    moved = dphi.copy()
+    if which == "inertials":
+        moved += 1e-4 * np.abs(np.asarray(ROBOT.phi)).ravel()
+    else:
+        amplitudes[which] *= 1.0 + 1e-4
+    change = settled(found_model(moved, amplitudes))[2].corrected - torques.corrected
+    step = coefficients(moved, amplitudes) - coefficients(dphi, amplitudes_of(model))
+    scale = np.abs(BAND.apply(change)).max()
+    np.testing.assert_allclose(rows.X @ step / scale, BAND.apply(change) / scale, atol=2e-3)
+
+
+def test_inertials_alone_are_refitted_to_the_plain_log(explained):
+    *_, rows = explained
+    lib, along, _ = settled(found_model(np.zeros(10 * N), [0.0 * np.array(w) for _, _, w, _ in FOUND]))
+    plain = stretch(lib, along, 0, BAND, np.eye(10 * N))
+    columns = np.concatenate([np.arange(10 * N), plain.X.shape[-1] - np.arange(10, 0, -1)])
+    bare = rows.of_rigid_body(columns)
+    np.testing.assert_allclose(bare.X, plain.X[..., columns])
+    np.testing.assert_allclose(bare.y, plain.y)
+    assert not np.allclose(rows.X[..., columns], plain.X[..., columns])
