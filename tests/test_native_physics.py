@@ -22,6 +22,10 @@ CYLINDRICAL = HEAD + """<body pos="0 0 .3"><joint name="turn" axis="0 0 1" range
  <geom type="box" size=".15 .05 .1" pos=".1 .02 0" density="1500"/>
  <body pos=".1 0 0"><joint name="reach" type="slide" axis="1 0 0" range="0 .4" armature="1"/>
   <geom type="capsule" fromto="0 0 0 .4 0 0" size=".04" density="2500"/></body></body></worldbody></mujoco>"""
+LIFT_AND_TURN = HEAD + """<body pos="0 0 .3"><joint name="rise" type="slide" axis="0 0 1" range="0 .4" armature="1"/>
+ <geom type="box" size=".05 .05 .1" density="1500"/>
+ <body pos=".1 0 0"><joint name="turn" axis="0 0 1" range="-2.5 2.5" armature=".001"/>
+  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".03" density="2500"/></body></body></worldbody></mujoco>"""
 PENDULUM = HEAD + """<body pos="0 0 1"><joint name="swing" axis="0 1 0" range="-3 3" armature=".02"/>
  <geom type="capsule" fromto="0 0 0 0 0 -.5" size=".03" density="2700"/></body></worldbody></mujoco>"""
 
@@ -106,6 +110,15 @@ def test_gravity_that_leans_on_links_known_roughly_comes_without_a_spring(seed):
     # Nothing but leaning gravity shows where the first link's mass is.
     expected = {("gravity_tilt", "turn", "reach"): 0.06 * np.sqrt(2.0)}
     assert named(CYLINDRICAL, hide, seed) == pytest.approx(expected, rel=0.02)
+
+
+def test_a_tilt_stays_where_nothing_else_shows_where_the_mass_is():
+    def hide(true):
+        true.opt.gravity[:] = 9.81 * np.array([0.04, 0.03, -1.0])
+        true.dof_frictionloss[1] = 0.1
+
+    expected = {("gravity_tilt", "rise", "turn"): 0.05, ("coulomb_friction", "turn"): 0.1}
+    assert named(LIFT_AND_TURN, hide, 0) == pytest.approx(expected, rel=0.06)  # known no better than the inertials
 
 
 def test_a_rotor_that_only_impossible_inertials_could_stand_for_is_named():

@@ -104,6 +104,12 @@ def test_columns_are_slopes_of_the_torque(explained, which):
     np.testing.assert_allclose(rows.X @ step / scale, BAND.apply(change) / scale, atol=2e-3)
 
 
+def test_slopes_rest_on_what_leans_gravity_and_on_laws_of_the_log():
+    model = found_model(np.zeros(10 * N), [np.array(w) for _, _, w, _ in FOUND])
+    every = {(slug, joints) for slug, joints, *_ in FOUND}
+    assert point(ROBOT, np.zeros(10 * N), model.named).rests_on == every - {("coulomb_friction", (0,))}
+
+
 def test_inertials_alone_are_refitted_to_the_plain_log(explained):
     *_, rows = explained
     lib, along, _ = settled(found_model(np.zeros(10 * N), [0.0 * np.array(w) for _, _, w, _ in FOUND]))

@@ -90,6 +90,14 @@ def explain(
     noise: Noise | None = None
 
     def explained(turn: int, blocks: int) -> Explanation:
+        ex = explained_at(at, turn, blocks)
+        if at and not at.rests_on <= {(m.slug, m.joints) for m in ex.members}:
+            # Under leaning gravity that nothing is named for, inertials can feign the tilt.
+            del ex
+            return explained_at(None, turn, blocks)
+        return ex
+
+    def explained_at(at: Point | None, turn: int, blocks: int) -> Explanation:
         progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
         both = zip(along, loads, strict=True)
         rows = [stretch(lib, r, i, band, factor, load, at) for i, (r, load) in enumerate(both)]

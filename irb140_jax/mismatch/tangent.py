@@ -30,11 +30,13 @@ class Point(NamedTuple):
         leaning: The nominal robot under the gravity found, or None where that is the model's own.
         dphi: Shift of the inertials, shape (10 n,).
         log: Laws of the log, in the order in which they act.
+        rests_on: Effects that it is made of, (slug, joints): of an explanation without them its slopes say nothing.
     """
 
     leaning: Robot | None
     dphi: np.ndarray
     log: tuple[Named, ...]
+    rests_on: frozenset[tuple[str, tuple[int, ...]]]
 
     @property
     def plain(self) -> bool:
@@ -50,10 +52,10 @@ def point(robot: Robot, dphi: np.ndarray, named: Sequence[Named]) -> Point:
         dphi: Shift of the inertials, shape (10 n,).
         named: The effects.
     """
-    gravity = as_named(robot, named).gravity
-    leans = not np.array_equal(gravity, robot.gravity)
-    leaning = eqx.tree_at(lambda r: r.gravity, robot, gravity) if leans else None
-    return Point(leaning, dphi, tuple(sorted((n for n in named if n.effect.logged), key=lambda n: n.effect.logged)))
+    lean = [n for n in named if not np.array_equal(as_named(robot, [n]).gravity, robot.gravity)]
+    leaning = eqx.tree_at(lambda r: r.gravity, robot, as_named(robot, lean).gravity) if lean else None
+    log = sorted((n for n in named if n.effect.logged), key=lambda n: n.effect.logged)
+    return Point(leaning, dphi, tuple(log), frozenset((n.effect.slug, n.joints) for n in (*lean, *log)))
 
 
 def regressor(at: Point, recording: Conditioned, upright: np.ndarray) -> np.ndarray:
