@@ -267,10 +267,10 @@ def _learnt(network: dict) -> Claim:
 
 
 def _penalised(network: dict) -> Claim:
-    """Runs of several seeds with each form and weight, against those without."""
+    """Runs of several seeds with each form and weight, against those without; all warmed up, so that none gets stuck."""
     runs: dict[tuple, list[dict]] = {}
     for row in network["cases"]:
-        if row["case"]["region"] == "branch":
+        if row["case"]["region"] == "branch" and row["case"]["warm_up"]:
             runs.setdefault((row["case"]["penalty"], row["case"]["weight"]), []).append(row)
     of = lambda rows, key: np.array([row["bins"][-1][key] for row in rows])  # noqa: E731
     plain = runs.pop(("none", 0.0))

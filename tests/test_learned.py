@@ -169,6 +169,21 @@ def test_the_rate_starts_at_a_hundredth_and_falls_where_validation_rests(samples
     assert slower.rate[10] <= 0.5 * curve.rate[10]
 
 
+def test_a_warm_up_makes_the_first_steps_short_and_then_nothing_else(samples):
+    _, cold = trained(task(), samples)
+    _, warm = trained(task(), samples, SETTINGS._replace(warm_up=0.2))  # six epochs
+    np.testing.assert_allclose(warm.rate[:6] / cold.rate[:6], np.arange(1, 7) / 6, rtol=1e-6)
+    np.testing.assert_array_equal(warm.rate[6:], cold.rate[6:])
+    start = task().network(samples[0], key=jax.random.key(2))
+    moved = {}
+    for settings in (SETTINGS, SETTINGS._replace(warm_up=0.2)):
+        state = learned.begin(start, settings)
+        after, _ = learned.train(state, task(), samples[0], samples[1], settings, 1, key=jax.random.key(3))
+        weights = [jax.tree.leaves(eqx.filter(x.layers, eqx.is_array)) for x in (start, after.network)]
+        moved[settings.warm_up] = max(float(jnp.abs(a - b).max()) for a, b in zip(*weights, strict=True))
+    assert moved[0.2] < 0.2 * moved[0.0]
+
+
 def test_an_error_that_is_no_number_never_makes_the_best_network(samples):
     broken = samples[1]._replace(position=jnp.full_like(samples[1].position, jnp.nan))
     state, _ = trained(task(), (samples[0], broken), chunks=(2,))
@@ -204,7 +219,8 @@ def test_the_experiment_is_made_whole_and_is_not_repeated(tmp_path):
     assert first.returncode == 0, first.stderr
     table = json.loads((tmp_path / "mlp_kinematics_smoke.json").read_text())
     assert all(np.isfinite(row["validation"]) for row in table["cases"])
-    by_seed = {row["case"]["seed"]: row for row in table["cases"] if row["reading"] == "inverse, branch, 4 x 122, MAE"}
+    reading = "inverse, branch, 4 x 122, MAE, warmed up"
+    by_seed = {row["case"]["seed"]: row for row in table["cases"] if row["reading"] == reading}
     assert by_seed[0]["validation"] != by_seed[1]["validation"]
     said = (tmp_path / "mlp_kinematics_smoke.md").read_text()
     mean = np.mean([row["bins"][-1]["chosen_p95"] for row in by_seed.values()])

@@ -131,6 +131,7 @@ class AbstractEffect(abc.ABC):
         scanned: From how many shapes a scout picks the best: what chance has as many tries at.
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
         tied: Its amplitudes are of one order of size: what the data can't see of one, the others bound.
+        vector: Its amplitudes are components of one vector: what the data can't see of it may be larger than the rest.
         alters: Slug of the law that it alters: it stands beside that, or one that contains it, or not at all.
         silent: It competes with what was left out, and is not that: no finding bears its name.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
@@ -165,6 +166,7 @@ class AbstractEffect(abc.ABC):
     scanned: ClassVar[int] = 1
     adds_up: ClassVar[bool] = False
     tied: ClassVar[bool] = False
+    vector: ClassVar[bool] = False
     alters: ClassVar[str | None] = None
     silent: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)

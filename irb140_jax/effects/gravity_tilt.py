@@ -27,6 +27,7 @@ class GravityTilt(AbstractEffect):
     formless = True
     leans_on_inertials = True
     everywhere = True
+    vector = True
     mjcf = "the gravity of the option element"
     not_in_mjcf = ""
 

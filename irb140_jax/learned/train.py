@@ -1,6 +1,5 @@
 """Backpropagation with an adaptive rate that starts at 0.01, and a stop when validation no longer improves."""
 
-from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import equinox as eqx
@@ -23,6 +22,8 @@ class Settings(NamedTuple):
         epochs: Passes over the samples, over which the rate falls to nothing (half a cosine).
         batch: Samples per step.
         rate: Rate at the start; the study's.
+        warm_up: Share of the epochs over which the rate first rises to that, which the text does not name.  Deep
+            networks of sigmoids whose first steps are as long as later ones often get stuck.
         optimiser: "adam", or "sgd" with momentum 0.9.
         patience: Share of the epochs without improvement after which the rate is halved beyond that.  A rate of 0.01
             makes validation noisy; halved at the first pause it is spent before the network has learnt much.
@@ -33,6 +34,7 @@ class Settings(NamedTuple):
     epochs: int = 600
     batch: int = 250
     rate: float = 0.01
+    warm_up: float = 0.0
     optimiser: Literal["adam", "sgd"] = "adam"
     patience: float = 0.125
     stop: float = 0.33
@@ -72,7 +74,7 @@ class Curve(NamedTuple):
         cost: Mean cost of the batches as they were met.
         training: Their mean position error [m].
         validation: Mean position error on the validation samples after the epoch [m].
-        rate: Learning rate.
+        rate: Learning rate at its end.
     """
 
     cost: Float[Array, " e"]
@@ -113,8 +115,8 @@ def train(
     def cost(arrays, rows: Int[Array, " b"]) -> tuple[Scalar, Scalar]:
         return task.cost(eqx.combine(arrays, static), inputs[rows], training.position[rows])
 
-    def step(rate: Scalar, carry, rows: Int[Array, " b"]):
-        arrays, moments = carry
+    def step(carry, now: tuple[Int[Array, " b"], Scalar]):
+        (arrays, moments), (rows, rate) = carry, now
         value, slope = jax.value_and_grad(cost, has_aux=True)(arrays, rows)
         change, moments = _optimiser(settings).update(slope, moments)
         arrays = jax.tree.map(lambda a, c: a - (rate * c).astype(a.dtype), arrays, change)
@@ -122,13 +124,14 @@ def train(
 
     def epoch(state: State) -> tuple[State, Curve]:
         falling = 0.5 * (1.0 + jnp.cos(jnp.pi * state.epoch / settings.epochs))
-        rate = settings.rate * falling * state.plateau.scale
         rows = _batches(jax.random.fold_in(key, state.epoch), len(inputs), settings.batch)
+        rates = settings.rate * falling * state.plateau.scale * _warm(state.epoch, len(rows), settings)
         start = eqx.filter(state.network, eqx.is_array), state.moments
-        (arrays, moments), met = jax.lax.scan(partial(step, rate), start, rows)
+        (arrays, moments), met = jax.lax.scan(step, start, (rows, rates))
         error = jnp.mean(position_errors(task, eqx.combine(arrays, static), validation))
         after = _remembered(state, eqx.combine(arrays, static), error, settings)
-        return eqx.tree_at(lambda s: s.moments, after, moments), Curve(jnp.mean(met[0]), jnp.mean(met[1]), error, rate)
+        curve = Curve(jnp.mean(met[0]), jnp.mean(met[1]), error, rates[-1])
+        return eqx.tree_at(lambda s: s.moments, after, moments), curve
 
     def one(arrays, _):
         state = eqx.combine(arrays, rest)
@@ -139,6 +142,13 @@ def train(
     arrays, rest = eqx.partition(state, eqx.is_array)
     arrays, curve = jax.lax.scan(one, arrays, None, epochs)
     return eqx.combine(arrays, rest), curve
+
+
+def _warm(epoch: Int[Array, ""], steps: int, settings: Settings) -> Float[Array, " steps"]:
+    """What share of the rate every step of an epoch has."""
+    done = epoch + jnp.arange(1, steps + 1) / steps
+    rise = settings.warm_up * settings.epochs
+    return jnp.minimum(1.0, done / rise) if rise else jnp.ones(steps)
 
 
 def _arrays(tree):

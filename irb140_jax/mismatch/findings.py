@@ -2,21 +2,19 @@
 
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.explain import Explanation, full_posterior
+from irb140_jax.mismatch.intervals import others, parameters_of
 from irb140_jax.mismatch.name import PREFER
 from irb140_jax.mismatch.problem import group_odds
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
-from irb140_jax.mismatch.scout import left_over
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.robot import Robot
 
-NEIGHBOURS = 12  # shapes around the named one that tell how finely its grid resolves each parameter
 WORTH_SAYING = 0.02  # alternatives less probable than this stay unsaid
 
 
@@ -33,7 +31,7 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         at += len(c.columns)
         if c.effect.silent:
             continue
-        values = _parameters(robot, ex, index, w[rows], cov[rows, rows], float(np.max(widen[rows])))
+        values = parameters_of(robot, ex, index, w[rows], cov[rows, rows], float(np.max(widen[rows])))
         names = ", ".join(robot.joint_names[j] for j in c.joints)
         units = {k: v["unit"] for k, v in values.items()}
         out.append({
@@ -48,110 +46,9 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     return sorted(out, key=lambda f: -f["evidence"]["delta_bic"])
 
 
-def _parameters(
-    robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray, widen: float
-) -> dict[str, Any]:
-    """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt."""
-    c = ex.data.candidates[index]
-    value = _physical(c, w)
-    w, cov = _of_all_columns(ex, index, w, cov)
-    physical = lambda w: np.asarray(c.effect.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
-    slope = np.stack([
-        (physical(w + step) - physical(w - step)) / (2 * step.sum())
-        for step in np.diag(1e-5 * np.maximum(np.abs(w), 1e-6))
-    ], axis=1)  # fmt: skip
-    variance = np.einsum("pk,kl,pl->p", slope, cov, slope) + _variance_over_shapes(ex, index, value, widen)
-    if c.effect.leans_on_inertials:
-        variance = variance + (value * _inertial_doubt(ex, c)) ** 2
-    if c.effect.scouts:
-        alike = c.effect.alike(left_over(ex.data, np.zeros(0, dtype=int), ex.noise.total), w, c.shape)
-        variance = variance + np.sum((alike - value) ** 2, axis=0) / 2.0
-    slide = robot.is_slide[c.joints[0]]
-    return {
-        parameter.name: {
-            "value": float(value[i]), "std": float(np.sqrt(max(variance[i], 0.0))),
-            "unit": c.effect.unit(parameter, slide),
-        }
-        for i, parameter in enumerate(c.effect.parameters)
-    }  # fmt: skip
-
-
-def _of_all_columns(ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Amplitudes and covariance of all columns of an effect: those unused are zero but for what the data leave open."""
-    c = ex.data.candidates[index]
-    width = max(max(v) for v in c.effect.variants) + 1
-    columns = c.columns[0] - c.variant[0] + np.arange(width)
-    H = ex.problem.eliminated_near(ex.chosen, columns + ex.problem.offset)
-    scale = ex.data.scale[ex.data.nuisances + columns]
-    full, spread = np.zeros(width), np.diag(scale**2 / (1.0 + np.diag(H)[:-1]))
-    used = list(c.variant)
-    full[used] = w
-    spread[used] = spread[:, used] = 0.0
-    spread[np.ix_(used, used)] = cov
-    return full, spread
-
-
-def _physical(c: Candidate, w: np.ndarray) -> np.ndarray:
-    """Physical parameters from the amplitudes that a candidate uses."""
-    full = np.zeros(max(max(v) for v in c.effect.variants) + 1)
-    full[list(c.variant)] = w
-    return np.asarray(c.effect.physical(jnp.asarray(full), jnp.asarray(c.shape)))
-
-
-def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray, widen: float) -> np.ndarray:
-    """Variance of the physical parameters over the refined grid of shapes, amplitudes fitted anew at each.
-
-    Args:
-        ex: The explanation.
-        index: The finding.
-        value: Its physical parameters.
-        widen: How much wider than by white noise its amplitudes scatter over the recordings; so does its shape.
-    """
-    c = ex.data.candidates[index]
-    if not c.effect.refines():
-        return np.zeros(len(value))
-    alike = [
-        i
-        for i, o in enumerate(ex.data.candidates)
-        if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant
-    ]
-    gain = ex.problem.scores(_others(ex, index), c.joints)[alike]
-    loss = np.where(np.isfinite(gain), gain[alike.index(index)] - gain, np.inf) / widen**2
-    p = np.exp(-np.clip(loss - loss.min(), 0.0, 700.0)) if np.isfinite(loss).any() else np.ones(len(alike))
-    p /= p.sum()
-    shapes = np.array([ex.data.candidates[i].shape for i in alike])
-    off = np.abs(shapes - c.shape) / np.maximum(np.ptp(shapes, axis=0), 1e-300)
-    nearest = set(np.argsort(off.sum(axis=1))[1 : 1 + NEIGHBOURS].tolist())
-    refitted = {k: _refitted(ex, index, alike[k]) for k in range(len(alike)) if p[k] > 1e-3 or k in nearest}
-    between = np.sum([p[k] * (v - value) ** 2 for k, v in refitted.items()], axis=0)
-    steps = np.array([np.abs(refitted[k] - value) for k in nearest]).reshape(-1, len(value))
-    # A grid narrower than the posterior: the loss to a neighbour, taken for a parabola, says how far it reaches.
-    lost = np.array([max(loss[k], 0.5) for k in nearest]).reshape(-1, 1)
-    beyond = np.max(steps**2 / (2.0 * lost), axis=0, initial=0.0)
-    # A posterior narrower than the grid is known to the grid's spacing.
-    spacing = np.min(np.where(steps > 1e-9 * np.abs(value), steps, np.inf), axis=0, initial=np.inf)
-    spacing = np.where(np.isfinite(spacing), spacing, 0.0)
-    return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + c.effect.blur() ** 2
-
-
-def _refitted(ex: Explanation, index: int, other: int) -> np.ndarray:
-    """Physical parameters where another candidate of the same kind stands in a finding's place."""
-    post = full_posterior(ex.data, ex.problem, ex.grams, (*_others(ex, index), other))
-    c = ex.data.candidates[other]
-    k = len(c.columns)
-    return _physical(c, (post.mean * ex.data.scale[post.columns])[-k:])
-
-
-def _inertial_doubt(ex: Explanation, c: Candidate) -> float:
-    """Relative standard deviation left in the inertials of the links that a joint carries, root mean square."""
-    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
-    carried = slice(10 * min(c.joints), ex.data.nuisances)
-    return float(ex.data.scale[0] * np.sqrt(np.mean(np.diag(post.cov)[carried])))
-
-
 def _evidence(ex: Explanation, index: int) -> dict[str, float]:
     columns = ex.data.candidates[index].columns + ex.problem.offset
-    H = ex.problem.eliminated_near(_others(ex, index), columns)
+    H = ex.problem.eliminated_near(others(ex, index), columns)
     drop = float(H[:-1, -1] @ np.linalg.lstsq(H[:-1, :-1], H[:-1, -1], rcond=1e-12)[0])
     share, _ = held_out_gain(ex, index)
     return {"delta_bic": drop - len(columns) * float(np.log(ex.grams.rows.sum())), "heldout_gain": share}
@@ -160,7 +57,7 @@ def _evidence(ex: Explanation, index: int) -> dict[str, float]:
 def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], float]:
     """Log odds of every effect that could stand in a finding's place, and of none (slug "")."""
     c = ex.data.candidates[index]
-    rest = _others(ex, index)
+    rest = others(ex, index)
     taken = {(ex.data.candidates[i].slug, ex.data.candidates[i].joints) for i in rest}
     odds = {
         key: value
@@ -203,10 +100,6 @@ def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[tuple[s
             if joints == c.joints and not known and special.slug not in CATALOGUE[slug].contains:
                 odds[slug, joints] = max(odds.get((slug, joints), -np.inf), base + value)
     return odds
-
-
-def _others(ex: Explanation, index: int) -> tuple[int, ...]:
-    return tuple(c for c in ex.chosen if c != index)
 
 
 def _shares(odds: dict) -> dict:

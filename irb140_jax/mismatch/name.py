@@ -164,9 +164,11 @@ def _exchange(
             c = problem.candidates[i]
             if len(drop) == 1 and c.slug in old[0].effect.contains:
                 continue  # `_simplify` decides that
-            more = _size(c) > sum(_size(o) for o in old) and not all(o.effect.silent for o in old)
+            same = len(drop) == 1 and (c.slug, c.joints) == (old[0].slug, old[0].joints)
+            more = _size(c) > sum(_size(o) for o in old) and not (same or all(o.effect.silent for o in old))
             rarer = all(o.effect.ordinary for o in old) and not c.effect.ordinary
-            # More parameters, or a rarer law in the place of ordinary friction, must be clearly better.
+            # More parameters, or a rarer law in the place of ordinary friction, must be clearly better; not the same
+            # law with more columns: its name is not in question, and what it lacks makes its other parameters wrong.
             gain = scores[i] - (PREFER + hurdle[i] if more or rarer else 0.0)
             if gain > best:
                 best, best_move = gain, (*rest, int(i))
@@ -192,22 +194,17 @@ def _simplify(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) 
 
 
 def simpler(problem: Problem, d: int) -> list[tuple[int, ...]]:
-    """What could stand for a law: its special cases, itself with fewer columns, or ordinary friction, no more of it."""
+    """What could stand for a law: its special cases, or ordinary friction, no more of it."""
     member = problem.candidates[d]
     if member.effect.ordinary:
         return []
     at_site = [(i, c) for i, c in enumerate(problem.candidates) if c.joints == member.joints]
-    fewer: list[tuple[int, ...]] = [
-        (i,)
-        for i, c in at_site
-        if c.slug in member.effect.contains
-        or (c.slug == member.slug and len(c.columns) < len(member.columns) and np.array_equal(c.shape, member.shape))
-    ]
+    special: list[tuple[int, ...]] = [(i,) for i, c in at_site if c.slug in member.effect.contains]
     if not member.effect.friction:
-        return fewer
+        return special
     ordinary = tuple(i for i, c in at_site if c.effect.ordinary)
-    one = [(i,) for i in ordinary if (i,) not in fewer]
-    return [*fewer, *one, *([ordinary] if 1 < len(ordinary) <= _size(member) else [])]
+    one = [(i,) for i in ordinary if (i,) not in special]
+    return [*special, *one, *([ordinary] if 1 < len(ordinary) <= _size(member) else [])]
 
 
 def _size(c: Candidate) -> int:

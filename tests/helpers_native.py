@@ -1,10 +1,9 @@
-"""Physics that MuJoCo has itself (frictionloss, damping, armature), on arms and in a loop that are not ours."""
+"""Recordings of arms, and of physics that MuJoCo has itself, from a loop that is not ours."""
 
 from collections.abc import Callable
 
 import mujoco
 import numpy as np
-import pytest
 
 from irb140_jax.mismatch import diagnose
 from irb140_jax.recordings.recording import Recording
@@ -30,6 +29,12 @@ PENDULUM = HEAD + """<body pos="0 0 1"><joint name="swing" axis="0 1 0" range="-
  <geom type="capsule" fromto="0 0 0 0 0 -.5" size=".03" density="2700"/></body></worldbody></mujoco>"""
 
 
+TWO_LINKS = HEAD + """<body pos="0 0 1"><joint name="upper" axis="0 1 0" range="-1.5 1.5" armature=".05"/>
+ <geom type="capsule" fromto="0 0 0 .3 0 0" size=".04" density="2500"/>
+ <body pos=".3 0 0"><joint name="lower" axis="0 1 0" range="-2 2" armature=".02"/>
+  <geom type="capsule" fromto="0 0 0 .25 0 0" size=".03" density="2500"/></body></body></worldbody></mujoco>"""
+
+
 def model_of(xml: str) -> mujoco.MjModel:
     """Without contacts."""
     model = mujoco.MjModel.from_xml_string(xml)
@@ -37,8 +42,14 @@ def model_of(xml: str) -> mujoco.MjModel:
     return model
 
 
-def recorded(xml: str, hide: Callable[[mujoco.MjModel], None], rng: np.random.Generator, seconds=12.0) -> Recording:
-    """A sum of sines under computed torque and proportional-derivative feedback; torques with 1 % of noise."""
+def recorded(
+    xml: str, hide: Callable[[mujoco.MjModel], None], rng: np.random.Generator, seconds: float = 12.0,
+    under: Callable[[mujoco.MjModel, np.ndarray], None] = lambda model, load: None,
+) -> Recording:  # fmt: skip
+    """A sum of sines under computed torque and proportional-derivative feedback; torques with 1 % of noise.
+
+    What a model is under the torques that reach its links (`under`) it becomes before every step.
+    """
     nominal, true = model_of(xml), model_of(xml)
     hide(true)
     n = nominal.nv
@@ -59,6 +70,7 @@ def recorded(xml: str, hide: Callable[[mujoco.MjModel], None], rng: np.random.Ge
         plant.qfrc_applied[:] = torque
         q.append(plant.qpos.copy())
         tau.append(torque.copy())
+        under(true, torque + plant.qfrc_constraint)
         mujoco.mj_step(true, plant)
     q, tau = np.array(q)[::2], np.array(tau)[::2]
     noise = 0.01 * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)
@@ -66,70 +78,9 @@ def recorded(xml: str, hide: Callable[[mujoco.MjModel], None], rng: np.random.Ge
     return Recording(times[::2], q + 1e-5 * rng.normal(size=q.shape), tau + noise, names, source="native")
 
 
-def named(xml: str, hide: Callable[[mujoco.MjModel], None], seed: int) -> dict[tuple[str, ...], float]:
+def named(xml: str, hide: Callable[[mujoco.MjModel], None], seed: int, **during) -> dict[tuple[str, ...], float]:
     """The first parameter of every finding."""
     rng = np.random.default_rng(seed)
     robot = robot_from_model(mujoco.MjModel.from_xml_string(xml), source="native")
-    found = diagnose(robot, [recorded(xml, hide, rng) for _ in range(2)]).diagnosis["findings"]
+    found = diagnose(robot, [recorded(xml, hide, rng, **during) for _ in range(2)]).diagnosis["findings"]
     return {(f["effect"], *f["joints"]): next(iter(f["parameters"].values()))["value"] for f in found}
-
-
-def test_what_mujoco_itself_calls_friction_damping_and_armature_is_named():
-    def hide(true):
-        true.dof_frictionloss[0], true.dof_damping[2] = 0.2, 25.0
-        true.dof_armature[1] += 0.04
-
-    friction = {("coulomb_friction", "shoulder"): 0.2, ("viscous_friction", "lift"): 25.0}
-    hidden = friction | {("rotor_inertia", "elbow"): 0.04}
-    assert named(SCARA, hide, 0) == pytest.approx(hidden, rel=0.03)
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-def test_friction_that_mujoco_turns_over_early_is_no_delay(seed):
-    def hide(true):
-        true.dof_frictionloss[0] = 1.0
-
-    assert named(PENDULUM, hide, seed) == pytest.approx({("coulomb_friction", "swing"): 1.0}, rel=0.01)
-
-
-@pytest.mark.parametrize("friction", [1.5, 4.0])
-def test_friction_under_which_mujoco_lets_a_slide_creep_is_no_stribeck(friction):
-    def hide(true):
-        true.dof_frictionloss[2], true.dof_damping[2] = friction, 8.0
-
-    hidden = {("coulomb_friction", "lift"): friction, ("viscous_friction", "lift"): 8.0}
-    assert named(SCARA, hide, 0) == pytest.approx(hidden, rel=0.03)
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-def test_gravity_that_leans_on_links_known_roughly_comes_without_a_spring(seed):
-    def hide(true):
-        true.opt.gravity[:] = 9.81 * np.array([0.06, -0.06, -1.0])
-        true.body_ipos[1, :2] += [-0.015, 0.02]
-
-    # Nothing but leaning gravity shows where the first link's mass is.
-    expected = {("gravity_tilt", "turn", "reach"): 0.06 * np.sqrt(2.0)}
-    assert named(CYLINDRICAL, hide, seed) == pytest.approx(expected, rel=0.02)
-
-
-def test_a_tilt_stays_where_nothing_else_shows_where_the_mass_is():
-    def hide(true):
-        true.opt.gravity[:] = 9.81 * np.array([0.04, 0.03, -1.0])
-        true.dof_frictionloss[1] = 0.1
-
-    expected = {("gravity_tilt", "rise", "turn"): 0.05, ("coulomb_friction", "turn"): 0.1}
-    assert named(LIFT_AND_TURN, hide, 0) == pytest.approx(expected, rel=0.06)  # known no better than the inertials
-
-
-def test_a_rotor_that_only_impossible_inertials_could_stand_for_is_named():
-    def hide(true):
-        true.dof_armature[0] += 0.25  # the link has 0.35 about the joint, known to 5 %
-
-    assert named(PENDULUM, hide, 0) == pytest.approx({("rotor_inertia", "swing"): 0.25}, rel=0.15)
-
-
-def test_a_payload_that_only_a_far_heavier_link_could_stand_for_is_named():
-    def hide(true):
-        true.body_mass[-1] *= 1.8
-
-    assert named(SCARA, hide, 0) == pytest.approx({("payload", "shoulder", "elbow", "lift"): 0.8 * 1.06}, rel=0.15)

@@ -1,0 +1,104 @@
+"""The page of what became of physics hidden by hand, out of what arms_by_hand.py stored; computes nothing."""
+
+import json
+import pathlib
+
+import numpy as np
+from hand_arms import ARMS
+from hand_laws import ORDINARY
+
+PAGE = pathlib.Path(__file__).resolve().parents[1] / "docs" / "arms-by-hand.md"
+OPENING = """# Arms and physics by hand
+
+Written by `experiments/arms_by_hand.py` from `results/arms_by_hand_*.jsonl`; don't edit. Six arms (a pendulum, two
+links, SCARA, gantry, cylindrical, seven joints) whose MJCF, control and hidden physics are written in `hand_arms.py`
+and `hand_laws.py`: MuJoCo's own `frictionloss`, `damping`, `armature`, `stiffness` and `gravity` where it has the
+physics. Inertials 5 % wrong, two recordings of 15 s that begin and end in motion, positions with 1e-5 of noise, torques
+with 1 %; effects of 6 to 25 % of the joint's torque, inertials as they are; delays of 6 to 22 ms, lags of 15 to 60 ms,
+zeros off by 0.02 to 0.06, payloads of 0.3 to 1 of the last link. Nothing is left out for being invisible: a zero of a
+vertical slide, or a gain where nothing but inertia acts, can't be seen by anyone.
+
+## One or two laws, a clean log
+"""
+OPENING_ROUGH = """## Friction on every joint, a rough log, and one more law beneath
+
+The same arms with MuJoCo's `frictionloss` (15 % of the joint's torque, give or take 40 %) and `damping` (10 %) on every
+joint; one more law of 6 to 25 % beneath, in five of six cases; three recordings of 20 s: sines, point to point, sines
+at a third of the speed. Encoders of 17 bits (slides 5 um), 2 % of coloured torque noise with spikes, uneven
+samples, lost ones, gaps of 20 ms.
+"""
+
+
+def key(effect: dict) -> tuple[str, ...]:
+    """What it is and where."""
+    return effect["effect"], *sorted(effect["joints"])
+
+
+def say(items: list[dict]) -> str:
+    """Effects with their joints, in words."""
+    return "; ".join(f"{i['effect']} on {', '.join(i['joints'])}" for i in items) or "nothing"
+
+
+def without(items: list[dict], others: list[dict]) -> list[dict]:
+    """Those that are not among the others."""
+    return [i for i in items if key(i) not in {*map(key, others)}]
+
+
+def table(cases: list[dict], ordinary: tuple[str, ...] = ()) -> list[str]:
+    """Lines with all figures of one kind; the `ordinary` laws, which every joint has, are counted apart."""
+    apart = ["ordinary friction", "named"] if ordinary else []
+    heads = ["arm", "cases", "exact, nothing added", "hidden", "named", "listed as not testable", *apart]
+    lines = [f"| {' | '.join([*heads, 'findings not there'])} |", "|---" * (len(heads) + 1) + "|"]
+    for arm, part in [*((a, [c for c in cases if c["arm"] == a]) for a in ARMS), ("all", cases)]:
+        laws = [(c, e) for c in part for e in c["truth"]]
+        missed = [(c, e) for c in part for e in without(c["truth"], c["found"])]
+        count = lambda pairs, usual: sum((e["effect"] in ordinary) == usual for _, e in pairs)  # noqa: E731
+        listed = sum(e["effect"] in {x["effect"] for x in c["not_testable"]} for c, e in missed)
+        row = [len(part), sum(c["exact"] for c in part), count(laws, False), count(laws, False) - count(missed, False)]
+        row += [listed, *((count(laws, True), count(laws, True) - count(missed, True)) if ordinary else ())]
+        row += [sum(len(without(c["found"], c["truth"])) for c in part)]
+        lines.append(f"| {arm} | {' | '.join(map(str, row))} |")
+    values = []
+    for c in cases:
+        found = {key(f): f["parameters"] for f in c["found"]}
+        for e in c["truth"]:
+            own = found.get(key(e), {})
+            values += [(own[k]["value"], own[k]["std"], v) for k, v in e["parameters"].items() if k in own and v]
+    error = np.median([abs(v / true - 1.0) for v, _, true in values])
+    cover = np.mean([abs(v - true) <= 1.645 * std for v, std, true in values])
+    nothing = [c for c in cases if all(e["effect"] in ordinary for e in c["truth"])]
+    false = sum(len(without(c["found"], c["truth"])) for c in nothing)
+    more = "Nothing more was hidden" if ordinary else "Nothing was hidden"
+    return [
+        *lines,
+        "",
+        f"{more} in {len(nothing)} of them; findings not there: {false}. Median error of the parameters of what",
+        f"is named {100 * error:.2g} %; {100 * cover:.0f} % of their 90 % intervals cover the truth.",
+        "",
+        "### Every case that is not exact",
+        "",
+        "| case | arm | hidden | missed | added | verdict |",
+        "|---|---|---|---|---|---|",
+        *(
+            f"| {c['seed']} | {c['arm']} | {say([e for e in c['truth'] if e['effect'] not in ordinary])} "
+            f"| {say(without(c['truth'], c['found']))} | {say(without(c['found'], c['truth']))} | {c['verdict']} |"
+            for c in cases
+            if not c["exact"]
+        ),
+        "",
+    ]
+
+
+def read(path: pathlib.Path) -> list[dict]:
+    """The cases that are done."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    return sorted(map(json.loads, lines), key=lambda c: c["seed"])
+
+
+def write(paths: dict[str, pathlib.Path]) -> None:
+    """docs/arms-by-hand.md from the files of each kind that are there."""
+    lines = []
+    for kind, opening, ordinary in (("clean", OPENING, ()), ("rough", OPENING_ROUGH, ORDINARY)):
+        if cases := read(paths[kind]):
+            lines += [opening, *table(cases, ordinary)]
+    PAGE.write_text("\n".join(lines), encoding="utf-8")

@@ -1,0 +1,155 @@
+"""Physical parameters of a finding, and how well the data know them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.explain import Explanation, full_posterior
+from irb140_jax.mismatch.scout import left_over
+from irb140_jax.robot import Robot
+
+NEIGHBOURS = 12  # shapes around the named one that tell how finely its grid resolves each parameter
+UNSEEN = 3.0  # a direction taken at random has six times as much of what isn't seen in one case of ten
+
+
+def parameters_of(
+    robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray, widen: float
+) -> dict[str, Any]:
+    """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt."""
+    c = ex.data.candidates[index]
+    value = _physical(c, w)
+    w, cov = _of_all_columns(ex, index, w, cov)
+    physical = lambda w: np.asarray(c.effect.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
+    variance = _variance_of(physical, w, cov, value) + _variance_over_shapes(ex, index, value, widen)
+    variance = variance + _variance_over_variants(ex, index, value)
+    if c.effect.leans_on_inertials:
+        variance = variance + (value * _inertial_doubt(ex, c)) ** 2
+    if c.effect.scouts:
+        alike = c.effect.alike(left_over(ex.data, np.zeros(0, dtype=int), ex.noise.total), w, c.shape)
+        variance = variance + np.sum((alike - value) ** 2, axis=0) / 2.0
+    slide = robot.is_slide[c.joints[0]]
+    return {
+        parameter.name: {
+            "value": float(value[i]), "std": float(np.sqrt(max(variance[i], 0.0))),
+            "unit": c.effect.unit(parameter, slide),
+        }
+        for i, parameter in enumerate(c.effect.parameters)
+    }  # fmt: skip
+
+
+def _variance_of(
+    physical: Callable[[np.ndarray], np.ndarray], w: np.ndarray, cov: np.ndarray, value: np.ndarray
+) -> np.ndarray:
+    """Mean square of what physical parameters are off by, their amplitudes being normal.
+
+    By points at plus and minus sqrt(n) standard deviations along each axis (spherical cubature), exact to third order:
+    a slope would be sure of the size of a tilt of which only one component shows.
+
+    Source: Arasaratnam and Haykin, IEEE Trans. Automatic Control 54(6) (2009), cubature rule of third degree.
+    """
+    size, axes = np.linalg.eigh(cov)
+    steps = (np.sqrt(len(w) * np.maximum(size, 0.0)) * axes).T
+    return np.mean([(physical(w + step) - value) ** 2 for step in (*steps, *-steps)], axis=0)
+
+
+def _of_all_columns(ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitudes and covariance of all columns of an effect: those unused are zero but for what the data leave open.
+
+    Of a vector's components those that move nothing are zero, too, give or take `UNSEEN` times what the others are.
+    """
+    c = ex.data.candidates[index]
+    width = max(max(v) for v in c.effect.variants) + 1
+    columns = c.columns[0] - c.variant[0] + np.arange(width)
+    H = ex.problem.eliminated_near(ex.chosen, columns + ex.problem.offset)
+    scale = ex.data.scale[ex.data.nuisances + columns]
+    full, spread = np.zeros(width), np.diag(scale**2 / (1.0 + np.diag(H)[:-1]))
+    used = list(c.variant)
+    full[used] = w
+    spread[used] = spread[:, used] = 0.0
+    spread[np.ix_(used, used)] = cov
+    unseen = scale == 0.0
+    if c.effect.vector and unseen.any() and not unseen.all():
+        spread[unseen, unseen] = UNSEEN**2 * np.mean(full[~unseen] ** 2)
+    return full, spread
+
+
+def _physical(c: Candidate, w: np.ndarray) -> np.ndarray:
+    """Physical parameters from the amplitudes that a candidate uses."""
+    full = np.zeros(max(max(v) for v in c.effect.variants) + 1)
+    full[list(c.variant)] = w
+    return np.asarray(c.effect.physical(jnp.asarray(full), jnp.asarray(c.shape)))
+
+
+def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray, widen: float) -> np.ndarray:
+    """Variance of the physical parameters over the refined grid of shapes, amplitudes fitted anew at each.
+
+    Args:
+        ex: The explanation.
+        index: The finding.
+        value: Its physical parameters.
+        widen: How much wider than by white noise its amplitudes scatter over the recordings; so does its shape.
+    """
+    c = ex.data.candidates[index]
+    if not c.effect.refines():
+        return np.zeros(len(value))
+    alike = [
+        i
+        for i, o in enumerate(ex.data.candidates)
+        if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant
+    ]
+    gain = ex.problem.scores(others(ex, index), c.joints)[alike]
+    loss = np.where(np.isfinite(gain), gain[alike.index(index)] - gain, np.inf) / widen**2
+    p = np.exp(-np.clip(loss - loss.min(), 0.0, 700.0)) if np.isfinite(loss).any() else np.ones(len(alike))
+    p /= p.sum()
+    shapes = np.array([ex.data.candidates[i].shape for i in alike])
+    off = np.abs(shapes - c.shape) / np.maximum(np.ptp(shapes, axis=0), 1e-300)
+    nearest = set(np.argsort(off.sum(axis=1))[1 : 1 + NEIGHBOURS].tolist())
+    refitted = {k: _refitted(ex, index, alike[k]) for k in range(len(alike)) if p[k] > 1e-3 or k in nearest}
+    between = np.sum([p[k] * (v - value) ** 2 for k, v in refitted.items()], axis=0)
+    steps = np.array([np.abs(refitted[k] - value) for k in nearest]).reshape(-1, len(value))
+    # A grid narrower than the posterior: the loss to a neighbour, taken for a parabola, says how far it reaches.
+    lost = np.array([max(loss[k], 0.5) for k in nearest]).reshape(-1, 1)
+    beyond = np.max(steps**2 / (2.0 * lost), axis=0, initial=0.0)
+    # A posterior narrower than the grid is known to the grid's spacing.
+    spacing = np.min(np.where(steps > 1e-9 * np.abs(value), steps, np.inf), axis=0, initial=np.inf)
+    spacing = np.where(np.isfinite(spacing), spacing, 0.0)
+    return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + c.effect.blur() ** 2
+
+
+def _variance_over_variants(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:
+    """Mean square by which the physical parameters of the same law with other columns differ, as probable as it is."""
+    c = ex.data.candidates[index]
+    forms = [
+        i
+        for i, o in enumerate(ex.data.candidates)
+        if (o.slug, o.joints) == (c.slug, c.joints) and o.variant != c.variant and np.array_equal(o.shape, c.shape)
+    ]
+    scores = ex.problem.scores(others(ex, index), c.joints)
+    # What is not admissible has a score of minus infinity.
+    forms = [i for i in forms if np.isfinite(scores[i]) and np.isfinite(scores[index])]
+    weight = np.exp(np.clip(scores[forms] - scores[index], -50.0, 50.0))
+    differ = np.array([(_refitted(ex, index, i) - value) ** 2 for i in forms]).reshape(-1, len(value))
+    return weight @ differ / (1.0 + weight.sum())
+
+
+def _refitted(ex: Explanation, index: int, other: int) -> np.ndarray:
+    """Physical parameters where another candidate of the same kind stands in a finding's place."""
+    post = full_posterior(ex.data, ex.problem, ex.grams, (*others(ex, index), other))
+    c = ex.data.candidates[other]
+    k = len(c.columns)
+    return _physical(c, (post.mean * ex.data.scale[post.columns])[-k:])
+
+
+def _inertial_doubt(ex: Explanation, c: Candidate) -> float:
+    """Relative standard deviation left in the inertials of the links that a joint carries, root mean square."""
+    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    carried = slice(10 * min(c.joints), ex.data.nuisances)
+    return float(ex.data.scale[0] * np.sqrt(np.mean(np.diag(post.cov)[carried])))
+
+
+def others(ex: Explanation, index: int) -> tuple[int, ...]:
+    """The members of an explanation but one."""
+    return tuple(c for c in ex.chosen if c != index)
