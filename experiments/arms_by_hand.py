@@ -2,14 +2,17 @@
 
     python experiments/arms_by_hand.py                    # cases 0 to 71, one or two effects, clean logs
     python experiments/arms_by_hand.py rough              # cases 0 to 47, friction everywhere and one more, rough logs
+    python experiments/arms_by_hand.py parts              # cases 0 to 53, second joints, tendons, walls ..., clean logs
+    python experiments/arms_by_hand.py rough_parts        # the same beneath friction everywhere, rough logs
     python experiments/arms_by_hand.py --first 72 --last 107
     python experiments/arms_by_hand.py --table            # docs/arms-by-hand.md from what is there
 
 `experiments/trials.py` hides physics by this library's own simulation of concealed effects.  A mistake in what a law
 means could be in both.  Here friction is MuJoCo's `frictionloss`, viscosity its `damping`, a rotor its `armature`, a
-spring its `stiffness`, a tilt its `gravity`, a payload a heavier last body; what MuJoCo has not (ripple, lag, delay) is
-a line of NumPy.  Computed torque on an arm whose inertials are 5 % wrong; two recordings of 15 s of a sum of sines, or
-three rough ones of 20 s: sines, point to point, slow sines.
+spring its `stiffness`, a tilt its `gravity`, a payload a heavier last body, play and elasticity a second joint, a
+coupling a tendon, a push a force on a body; what MuJoCo has not (ripple, lag, delay) is a line of NumPy.  Computed
+torque on an arm whose inertials are 5 % wrong; two recordings of 15 s of a sum of sines, or three rough ones of 20 s:
+sines, point to point, slow sines.
 
 Cases are appended to results/arms_by_hand_*.jsonl as they are done, so an interrupted run goes on where it stopped.
 """
@@ -18,13 +21,16 @@ import dataclasses
 import json
 import pathlib
 from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
+import mujoco
 import numpy as np
 import tyro
 from arms_by_hand_report import key, read, say, without, write
-from hand_arms import ARMS, MOTIONS, Plant, clean, recorded, rough, sizes_of, spec_of, wrong
+from hand_arms import ARMS, MOTIONS, Plant, Sizes, clean, compiled, plant_of, recorded, rough, sizes_of, tree_of, wrong
 from hand_laws import BENEATH_ONLY, EVERYWHERE, INSTEAD_OF, LAWS, ORDINARY
+from hand_parts import PARTS, add_tool
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.mismatch import diagnose
@@ -50,46 +56,86 @@ def rough_case(seed: int) -> tuple[str, Robot, list[Recording], list[dict]]:
     return arm, *hidden(arm, slugs, rough, rng)
 
 
+def parts_case(seed: int, logger: Callable = clean) -> tuple[str, Robot, list[Recording], list[dict]]:
+    """An arm with a part that the nominal arm has not: every part on every arm in turn."""
+    rng = np.random.default_rng([seed, 142])
+    slug, round_ = list(PARTS)[seed % len(PARTS)], seed // len(PARTS)
+    arm = list(ARMS)[(round_ + seed % len(PARTS)) % len(ARMS)]
+    if slug == "transmission_coupling" and arm == "pendulum":
+        arm = "two"  # it couples two joints
+    tree = tree_of(arm)
+    if slug == "contact":
+        add_tool(tree)
+    nominal = compiled(tree)
+    sizes, j = sizes_of(nominal), int(rng.integers(nominal.nv))
+    part = PARTS[slug](tree, j, rng.uniform(0.06, 0.25) * sizes.tau[j], sizes, rng)
+    plant = plant_of(compiled(tree), nominal)
+    wrong(plant.model, rng)
+    part.fit(plant)
+    joints = part.joints or [nominal.joint(i).name for i in range(nominal.nv)]
+    truth = [{"effect": slug, "joints": joints, "parameters": {k: float(v) for k, v in part.values.items()}}]
+    if logger is rough:
+        truth += rubbed(nominal, plant, sizes, rng, {(INSTEAD_OF.get(slug), j)})
+    recordings = [recorded(nominal, plant, rng, m, logger, i) for i, m in enumerate(MOTIONS[logger])]
+    return arm, robot_from_model(nominal, source=arm), recordings, truth
+
+
 def hidden(
     arm: str, slugs: list[str], logger: Callable, rng: np.random.Generator
 ) -> tuple[Robot, list[Recording], list[dict]]:
     """The nominal arm, recordings of one with other inertials and these laws, and their truth."""
-    sizes, nominal, true = sizes_of(arm), spec_of(arm).compile(), spec_of(arm).compile()
-    wrong(true, rng)
-    plant, truth = Plant(true, [], [], []), []
-
-    def hide(slug: str, j: int, share: float) -> None:
-        values = LAWS[slug](plant, j, share * sizes.tau[j], sizes, rng)
-        names = [nominal.joint(i).name for i in (range(nominal.nv) if slug in EVERYWHERE else [j])]
-        truth.append({"effect": slug, "joints": names, "parameters": {k: float(v) for k, v in values.items()}})
-
+    nominal = compiled(tree_of(arm))
+    sizes, plant = sizes_of(nominal), plant_of(compiled(tree_of(arm)), nominal)
+    wrong(plant.model, rng)
     at = [int(rng.integers(nominal.nv)) for _ in slugs]
-    for slug, j in zip(slugs, at, strict=True):
-        hide(slug, j, rng.uniform(0.06, 0.25))
+    truth = [
+        hide(slug, nominal, plant, j, rng.uniform(0.06, 0.25), sizes, rng) for slug, j in zip(slugs, at, strict=True)
+    ]
     if logger is rough:
         instead = {(INSTEAD_OF.get(slug), j) for slug, j in zip(slugs, at, strict=True)}
-        for slug, share in zip(ORDINARY, (0.15, 0.1), strict=True):
-            for j in range(nominal.nv):
-                if (slug, j) not in instead:
-                    hide(slug, j, share * rng.uniform(0.6, 1.4))
+        truth += rubbed(nominal, plant, sizes, rng, instead)
     recordings = [recorded(nominal, plant, rng, motion, logger) for motion in MOTIONS[logger]]
     return robot_from_model(nominal, source=arm), recordings, truth
+
+
+def rubbed(
+    nominal: mujoco.MjModel, plant: Plant, sizes: Sizes, rng: np.random.Generator, instead: set[tuple[str | None, int]]
+) -> list[dict]:
+    """Ordinary friction on all joints but where something stands instead of it, and its truth."""
+    return [
+        hide(slug, nominal, plant, j, share * rng.uniform(0.6, 1.4), sizes, rng)
+        for slug, share in zip(ORDINARY, (0.15, 0.1), strict=True)
+        for j in range(nominal.nv)
+        if (slug, j) not in instead
+    ]
+
+
+def hide(
+    slug: str, nominal: mujoco.MjModel, plant: Plant, j: int, share: float, sizes: Sizes, rng: np.random.Generator
+) -> dict:
+    """Put a law into a plant, of a share of the joint's torque, and say what it is."""
+    values = LAWS[slug](plant, j, share * sizes.tau[j], sizes, rng)
+    names = [nominal.joint(i).name for i in (range(nominal.nv) if slug in EVERYWHERE else [j])]
+    return {"effect": slug, "joints": names, "parameters": {k: float(v) for k, v in values.items()}}
 
 
 @dataclasses.dataclass(frozen=True)
 class Config:
     """Which cases."""
 
-    kind: tyro.conf.Positional[Literal["clean", "rough"]] = "clean"
+    kind: tyro.conf.Positional[Literal["clean", "rough", "parts", "rough_parts"]] = "clean"
     first: int = 0
     last: int | None = None
-    """The last seed; 71 of the clean ones, 47 of the rough ones."""
+    """The last seed; 71 of the clean ones, 47 of the rough ones, 53 of either with parts."""
     out: pathlib.Path = pathlib.Path("results")
     table: bool = False
     """Only write the page from the results that are there."""
 
 
-KINDS = {"clean": (case, 71), "rough": (rough_case, 47)}
+KINDS = {
+    "clean": (case, 71), "rough": (rough_case, 47), "parts": (parts_case, 53),
+    "rough_parts": (partial(parts_case, logger=rough), 53),
+}  # fmt: skip
 
 
 def judged(kind: str, seed: int) -> dict:

@@ -1,6 +1,7 @@
 """Arms whose MJCF, motions, control and loggers are written by hand: nothing here is this library's own simulation."""
 
 import dataclasses
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 
 import mujoco
@@ -59,12 +60,24 @@ ARMS = {
 
 @dataclasses.dataclass
 class Sizes:
-    """What a joint does along a motion of the unaltered arm, RMS of each, shape (n,)."""
+    """What the joints do along a motion of the unaltered arm.
+
+    Attributes:
+        tau, qd, qdd: RMS of each joint's, shape (n,).
+        middle, spread: Mean and standard deviation of its positions, shape (n,).
+        carried: Mean inertia of what it carries, without its rotor, shape (n,).
+        path: Where the tool goes, shape (P, 3); the last body's centre of mass where there is no tool.
+        reach: RMS of how joints move that, shape (3, n).
+    """
 
     tau: np.ndarray
     qd: np.ndarray
     qdd: np.ndarray
+    middle: np.ndarray
     spread: np.ndarray
+    carried: np.ndarray
+    path: np.ndarray
+    reach: np.ndarray
 
 
 @dataclasses.dataclass
@@ -73,25 +86,39 @@ class Plant:
 
     Attributes:
         model: Of MuJoCo.
+        driven: Its degrees of freedom that have motors and encoders, shape (n,).
         forces: Laws (t, q, qd, logged torque) -> torque on the joints.
         drive: Logged torque to the torque that the motor makes, step by step.
         log: Arrays t, q, tau -> those that are logged.
+        outside: What the surroundings do to it: (number of the recording, t, model, data), before every step.
     """
 
     model: mujoco.MjModel
-    forces: list[Callable]
-    drive: list[Callable]
-    log: list[Callable]
+    driven: np.ndarray
+    forces: list[Callable] = dataclasses.field(default_factory=list)
+    drive: list[Callable] = dataclasses.field(default_factory=list)
+    log: list[Callable] = dataclasses.field(default_factory=list)
+    outside: list[Callable] = dataclasses.field(default_factory=list)
 
 
-def spec_of(arm: str) -> mujoco.MjSpec:
-    """An arm, without contacts, with motors nowhere: torques are applied."""
-    xml = (
-        '<mujoco><compiler angle="radian" inertiafromgeom="true"/>'
+def tree_of(arm: str) -> ET.Element:
+    """An arm's MJCF, without contacts, with motors nowhere: torques are applied."""
+    return ET.fromstring(
+        '<mujoco><compiler angle="radian" inertiafromgeom="auto"/>'
         f'<option timestep="{STEP}" integrator="implicitfast"/><default><geom contype="0" conaffinity="0"/></default>'
         f"<worldbody>{ARMS[arm]}</worldbody></mujoco>"
     )
-    return mujoco.MjSpec.from_string(xml)
+
+
+def compiled(tree: ET.Element) -> mujoco.MjModel:
+    """The model of an MJCF tree."""
+    return mujoco.MjModel.from_xml_string(ET.tostring(tree, encoding="unicode"))
+
+
+def plant_of(model: mujoco.MjModel, nominal: mujoco.MjModel) -> Plant:
+    """A plant without any laws, driven where the nominal arm has joints."""
+    names = [nominal.joint(i).name for i in range(nominal.nv)]
+    return Plant(model, np.array([int(model.joint(name).dofadr[0]) for name in names]))
 
 
 def wrong(model: mujoco.MjModel, rng: np.random.Generator) -> None:
@@ -160,27 +187,29 @@ def rough(t, q, tau, slide, rng):
 
 
 def recorded(
-    nominal: mujoco.MjModel, plant: Plant, rng: np.random.Generator, motion: Callable, logger: Callable
+    nominal: mujoco.MjModel, plant: Plant, rng: np.random.Generator, motion: Callable, logger: Callable, number: int = 0
 ) -> Recording:
     """Computed torque and proportional-derivative feedback on what the encoders say, at every step."""
-    n, true = nominal.nv, mujoco.MjData(plant.model)
+    n, true, driven = nominal.nv, mujoco.MjData(plant.model), plant.driven
     model, torque = mujoco.MjData(nominal), np.zeros(n)
     wanted = motion(nominal, rng)
-    true.qpos[:], true.qvel[:], _ = wanted(0.0)
+    true.qpos[driven], true.qvel[driven], _ = wanted(0.0)
     q, tau, t = [], [], np.arange(0.0, SECONDS[logger], STEP)
     for now in t:
         at, speed, bend = wanted(now)
-        model.qpos[:], model.qvel[:] = true.qpos, true.qvel
+        model.qpos[:], model.qvel[:] = true.qpos[driven], true.qvel[driven]
         mujoco.mj_forward(nominal, model)
-        mujoco.mj_mulM(nominal, model, torque, bend + 40.0 * (speed - true.qvel) + 400.0 * (at - true.qpos))
+        mujoco.mj_mulM(nominal, model, torque, bend + 40.0 * (speed - model.qvel) + 400.0 * (at - model.qpos))
         torque += model.qfrc_bias
         made = torque.copy()
         for drive in plant.drive:
             made = drive(made)
         for force in plant.forces:
-            made = made + force(now, true.qpos, true.qvel, torque)
-        true.qfrc_applied[:] = made
-        q.append(true.qpos.copy())
+            made = made + force(now, model.qpos, model.qvel, torque)
+        true.qfrc_applied[driven] = made
+        for act in plant.outside:
+            act(number, now, plant.model, true)
+        q.append(model.qpos.copy())
         tau.append(torque.copy())
         mujoco.mj_step(plant.model, true)
     q, tau = np.array(q), np.array(tau)
@@ -199,10 +228,23 @@ SECONDS = {clean: 15.0, rough: 20.0, untouched: 15.0}
 MOTIONS = {clean: (sines, sines), rough: (sines, point_to_point, slow_sines)}
 
 
-def sizes_of(arm: str) -> Sizes:
+def sizes_of(model: mujoco.MjModel) -> Sizes:
     """How large things are along a motion of the unaltered arm."""
-    model = spec_of(arm).compile()
-    r = recorded(model, Plant(model, [], [], []), np.random.default_rng(0), sines, untouched)
+    r = recorded(model, plant_of(model, model), np.random.default_rng(0), sines, untouched)
     qd = np.gradient(r.q, r.t, axis=0)
     rms = lambda x: np.sqrt(np.mean(x**2, axis=0))  # noqa: E731
-    return Sizes(rms(r.tau), rms(qd), rms(np.gradient(qd, r.t, axis=0)), np.std(r.q, axis=0))
+    data, path, reach, carried = mujoco.MjData(model), [], [], []
+    for q in r.q[:: len(r.q) // 300]:
+        data.qpos[:] = q
+        mujoco.mj_forward(model, data)
+        path.append((data.site_xpos if model.nsite else data.xipos)[-1].copy())
+        reach.append(np.zeros((3, model.nv)))
+        mujoco.mj_jac(model, data, reach[-1], None, path[-1], model.nbody - 1)
+        mass = np.zeros((model.nv, model.nv))
+        for row, unit in zip(mass, np.eye(model.nv), strict=True):
+            mujoco.mj_mulM(model, data, row, unit)
+        carried.append(np.diag(mass) - model.dof_armature)
+    return Sizes(
+        rms(r.tau), rms(qd), rms(np.gradient(qd, r.t, axis=0)), np.mean(r.q, axis=0), np.std(r.q, axis=0),
+        np.mean(carried, axis=0), np.array(path), rms(np.array(reach)),
+    )  # fmt: skip

@@ -10,17 +10,17 @@ from hand_arms import STEP
 
 
 def coulomb(plant, j, torque, sizes, rng):
-    plant.model.dof_frictionloss[j] += torque
+    plant.model.dof_frictionloss[plant.driven[j]] += torque
     return {"coulomb": torque}
 
 
 def viscous(plant, j, torque, sizes, rng):
-    plant.model.dof_damping[j] += torque / sizes.qd[j]
+    plant.model.dof_damping[plant.driven[j]] += torque / sizes.qd[j]
     return {"viscous": torque / sizes.qd[j]}
 
 
 def rotor(plant, j, torque, sizes, rng):
-    plant.model.dof_armature[j] += torque / sizes.qdd[j]
+    plant.model.dof_armature[plant.driven[j]] += torque / sizes.qdd[j]
     return {"inertia": torque / sizes.qdd[j]}
 
 
@@ -80,7 +80,7 @@ def ripple(plant, j, torque, sizes, rng):
 def asymmetric(plant, j, torque, sizes, rng):
     forth, back = torque * rng.uniform(1.0, 1.5), torque * rng.uniform(0.3, 0.7)
     mean, shift, still = (forth + back) / 2.0, (forth - back) / 2.0, 0.01 * sizes.qd[j]
-    plant.model.dof_frictionloss[j] += mean
+    plant.model.dof_frictionloss[plant.driven[j]] += mean
     # A constant torque would be an offset: what differs is friction, of which there is none to see at rest.
     plant.forces.append(lambda t, q, qd, tau: np.eye(len(q))[j] * -shift * abs(np.tanh(qd[j] / still)))
     return {"coulomb_pos": forth, "coulomb_neg": back}
@@ -107,7 +107,7 @@ def stribeck(plant, j, torque, sizes, rng):
     def law(t, q, qd, tau):
         return np.eye(len(q))[j] * -top * np.exp(-((abs(qd[j]) / speed) ** power)) * np.tanh(qd[j] / still)
 
-    plant.model.dof_frictionloss[j] += torque
+    plant.model.dof_frictionloss[plant.driven[j]] += torque
     plant.forces.append(law)
     return {"coulomb": torque, "static": torque + top}
 
@@ -118,7 +118,7 @@ def uneven(plant, j, torque, sizes, rng):
         rng.uniform(0.0, 2.0 * np.pi),
         0.01 * sizes.qd[j],
     )
-    plant.model.dof_frictionloss[j] += torque
+    plant.model.dof_frictionloss[plant.driven[j]] += torque
 
     def law(t, q, qd, tau):
         return np.eye(len(q))[j] * -0.6 * torque * np.sin(n * q[j] + phase) * np.tanh(qd[j] / still)
@@ -137,7 +137,7 @@ def drag(plant, j, torque, sizes, rng):
 
 def lag(plant, j, torque, sizes, rng):
     time = rng.uniform(0.015, 0.06)
-    state = np.full(plant.model.nv, np.nan)
+    state = np.full(len(plant.driven), np.nan)
 
     def law(tau):
         # Backward Euler: at low frequencies exactly `time` late.
@@ -173,6 +173,7 @@ BENEATH_ONLY = ("stribeck_friction", "position_dependent_friction")
 INSTEAD_OF = {
     "asymmetric_friction": "coulomb_friction", "load_dependent_friction": "coulomb_friction",
     "stribeck_friction": "coulomb_friction", "position_dependent_friction": "coulomb_friction",
-    "nonlinear_viscous_friction": "viscous_friction",
+    "nonlinear_viscous_friction": "viscous_friction", "presliding_hysteresis": "coulomb_friction",
+    "thermal_friction_drift": "viscous_friction",
 }  # fmt: skip
 EVERYWHERE = ("gravity_tilt", "payload", "time_delay")

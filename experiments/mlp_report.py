@@ -52,7 +52,7 @@ def by_seed(rows: list[dict]) -> str:
             lines.append(f"| {reading} | {len(runs)} | {errors[0]} | {errors[1]} | {stuck(runs)} |")
     legend = (
         f"Stuck: runs whose validation error is over {STUCK:g} times that of the best seed, which learnt little. "
-        "Warmed up: the rate rises to 0.01 over the first 5 % of the epochs, which the text does not name."
+        "Warmed up: the rate rises over the first epochs, which the text does not name."
     )
     return "\n".join([*lines, "", legend])
 

@@ -45,10 +45,11 @@ def model_of(xml: str) -> mujoco.MjModel:
 def recorded(
     xml: str, hide: Callable[[mujoco.MjModel], None], rng: np.random.Generator, seconds: float = 12.0,
     under: Callable[[mujoco.MjModel, np.ndarray], None] = lambda model, load: None,
+    pushed: Callable[[float, mujoco.MjData], None] = lambda t, plant: None,
 ) -> Recording:  # fmt: skip
     """A sum of sines under computed torque and proportional-derivative feedback; torques with 1 % of noise.
 
-    What a model is under the torques that reach its links (`under`) it becomes before every step.
+    What a model is under the torques that reach its links (`under`) it becomes before every step, and is `pushed`.
     """
     nominal, true = model_of(xml), model_of(xml)
     hide(true)
@@ -71,6 +72,7 @@ def recorded(
         q.append(plant.qpos.copy())
         tau.append(torque.copy())
         under(true, torque + plant.qfrc_constraint)
+        pushed(t, plant)
         mujoco.mj_step(true, plant)
     q, tau = np.array(q)[::2], np.array(tau)[::2]
     noise = 0.01 * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)

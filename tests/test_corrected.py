@@ -34,7 +34,7 @@ VALUES = {
     "coefficient": 0.3, "exponent": 0.7, "load_coefficient": 0.05, "viscous_cold": 0.4, "relative_drop": 0.3,
     "depth": 0.5, "centre": 0.1, "width": 0.2, "inertia": 0.2, "gain": 1.05, "offset": 0.02, "amplitude": 0.3,
     "cycles_per_rad": 2.0, "delay": 0.003, "rest": 0.2, "tilt": 0.02, "mass": 0.4, "gap": 0.001,
-    "flank_stiffness": 5000.0, "normal_x": 0.6, "normal_y": 0.0, "normal_z": 0.8, "position": 0.2,
+    "flank_stiffness": 5000.0, "flank_damping": 0.3, "normal_x": 0.6, "normal_y": 0.0, "normal_z": 0.8, "position": 0.2,
 }  # fmt: skip
 OWN = {
     "thermal_friction_drift": {"time_constant": 3.0}, "actuator_lag": {"time_constant": 0.01},

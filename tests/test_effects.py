@@ -9,12 +9,12 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from helpers import random_robot
+from helpers_effects import KINDS, RESTING, SCALES, a_shape, every_effect, motion, rigid_body, robot, some_values
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irb140_jax import dynamics, effects
-from irb140_jax.effects import Motion, RigidBody, Scales
+from irb140_jax.effects import Motion, Scales
 from irb140_jax.effects.catalogue import CATALOGUE, _found
 from irb140_jax.mismatch.model import CorrectedModel, Named, predict
 from irb140_jax.recordings.concealed.catalogue import HIDDEN
@@ -49,164 +49,10 @@ VOCABULARY = {
     "contact": {"stiffness"},
     "external_wrench": {"t0", "t1"},
 }
-# The contract's equations written down once more: parameters, then qd, qdd, load and total torque of the site, (T, m).
-SIGN = {"sign": -1.0}
-LAWS = {
-    "coulomb_friction": lambda p, v, a, load, total: p["coulomb"] * np.sign(v),
-    "viscous_friction": lambda p, v, a, load, total: p["viscous"] * v,
-    "asymmetric_friction": lambda p, v, a, load, total: np.where(v > 0, p["coulomb_pos"], -p["coulomb_neg"]),
-    "stribeck_friction": lambda p, v, a, load, total: np.sign(v) * (
-        p["coulomb"] + (p["static"] - p["coulomb"]) * np.exp(-((v / p["stribeck_velocity"]) ** 2))),
-    "load_dependent_friction": lambda p, v, a, load, total: np.sign(v) * (
-        p["coulomb"] + p["load_coefficient"] * np.abs(load)),
-    "rotor_inertia": lambda p, v, a, load, total: p["inertia"] * a,
-    "torque_offset": lambda p, v, a, load, total: np.full_like(v, p["offset"]),
-    "torque_gain": lambda p, v, a, load, total: total / p["gain"] - total,
-    "transmission_coupling": lambda p, v, a, load, total: np.stack([
-        p["viscous"] * (v[:, 0] - v[:, 1]) + p["coulomb"] * np.sign(v[:, 0] - v[:, 1]),
-        p["viscous"] * (v[:, 1] - v[:, 0]) + p["coulomb"] * np.sign(v[:, 1] - v[:, 0])], axis=1),
-    "nonlinear_viscous_friction": lambda p, v, a, load, total: (
-        p["coefficient"] * np.abs(v) ** p["exponent"] * np.sign(v)),
-}  # fmt: skip
 
-
-def dahl(p, q):
-    """F -> Fc s + (F - Fc s) exp(-stiffness |dq| / Fc), step by step."""
-    force = np.zeros_like(q)
-    for k in range(1, len(q)):
-        dq = q[k] - q[k - 1]
-        limit = p["coulomb"] * np.sign(dq)
-        force[k] = limit + (force[k - 1] - limit) * np.exp(-p["stiffness"] * np.abs(dq) / p["coulomb"])
-    return force
-
-
-def of_link(m, j):
-    """Load, and what the link's own motion u makes of it: mass, damping, spring; each (T,)."""
-    own = (np.asarray(x)[:, j, j] for x in (m.rigid.mass, m.rigid.by_qd, m.rigid.by_q))
-    return np.asarray(m.carried)[:, j], *own
-
-
-def moved(m, j, bend):
-    """Torque on all joints that a link displaced by u, du/dt, d2u/dt2 no longer needs, (T, n)."""
-    parts = (m.rigid.by_q, m.rigid.by_qd, m.rigid.mass)
-    return -sum(np.asarray(x)[:, :, j] * u[:, None] for x, u in zip(parts, bend, strict=True))
-
-
-def swing(p, m, j):
-    """Newmark's rule, step by step, for a link on a spring K with 5 % of critical damping."""
-    load, mass, damping, spring = of_link(m, j)
-    K, dt, gamma = p["stiffness"], float(m.t[1] - m.t[0]), 0.55
-    beta = 0.25 * (gamma + 0.5) ** 2
-    damping, spring = damping + 0.1 * np.sqrt(K * mass), spring + K
-    u, v, a, out = load[0] / spring[0], (load[1] / spring[1] - load[0] / spring[0]) / dt, 0.0, []
-    for k in range(len(load)):
-        ahead, rate = u + dt * v + dt**2 * (0.5 - beta) * a, v + dt * (1 - gamma) * a
-        a = (load[k] - damping[k] * rate - spring[k] * ahead) / (
-            mass[k] + gamma * dt * damping[k] + beta * dt**2 * spring[k])
-        u, v = ahead + beta * dt**2 * a, rate + gamma * dt * a
-        out.append((u, v, a))
-    return np.transpose(out)
-
-
-def flight(p, m, j):
-    """A free link between two springy flanks, in quarters of a sample, step by step; derivatives by differences."""
-    load, mass, damping, spring = of_link(m, j)
-    half, K, dt = 0.5 * p["gap"], p["flank_stiffness"], float(m.t[1] - m.t[0])
-    h, side = dt / 4, np.sign(load[0])
-    u = before = side * half + load[0] / (K + spring[0])
-    path = []
-    for k in range(len(load)):
-        for i in range(1, 5):
-            force = load[max(k - 1, 0)] + (load[k] - load[max(k - 1, 0)]) * i / 4
-            push = force + mass[k] / h**2 * (2 * u - before) + damping[k] / h * u
-            stay = mass[k] / h**2 + damping[k] / h + spring[k]
-            new = push / stay
-            if abs(new) > half:
-                c = 0.3 * np.sqrt(K * mass[k]) / h
-                new = (push + K * half * np.sign(new) + c * u) / (stay + K + c)
-            u, before = new, u
-        path.append(u)
-    path = np.array(path)
-    held = np.concatenate([path[:1], path, path[-1:]])
-    return path, (held[2:] - held[:-2]) / (2 * dt), (held[2:] - 2 * path + held[:-2]) / dt**2
-
-
-# Those that look at more than speed and load: of parameters, motion, joint; torque of it (T, 1) or of all (T, n).
-AT = lambda x, j: np.asarray(x)[:, j : j + 1]  # noqa: E731
-LAWS_OF_MOTION = {
-    "thermal_friction_drift": lambda p, m, j: AT(m.qd, j) * p["viscous_cold"] * (
-        1 - p["relative_drop"] * (1 - np.exp(-np.asarray(m.t)[:, None] / p["time_constant"]))),
-    "position_dependent_friction": lambda p, m, j: np.sign(AT(m.qd, j)) * p["coulomb"] * (
-        1 + p["depth"] * np.exp(-(((AT(m.q, j) - p["centre"]) / p["width"]) ** 2))),
-    "presliding_hysteresis": lambda p, m, j: dahl(p, AT(m.q, j)),
-    "torque_ripple": lambda p, m, j: p["amplitude"] * np.sin(2 * np.pi * p["cycles_per_rad"] * AT(m.q, j)),
-    "actuator_lag": lambda p, m, j: p["time_constant"] * AT(m.scaled_rate, j),
-    "time_delay": lambda p, m, j: p["delay"] * np.stack(
-        [np.interp(m.t + 0.5 * p["delay"], m.t, x) for x in np.asarray(m.asked_rate).T], axis=1),
-    "gravity_spring": lambda p, m, j: p["stiffness"] * (AT(m.q, j) - p["rest"]),
-    "gravity_tilt": lambda p, m, j: p["tilt"] * float(m.rigid.gravity) * (m.rigid.by_gravity @ m.rigid.across[0]),
-    "payload": lambda p, m, j: p["mass"] * np.asarray(m.rigid.held)[:, :, 0],
-    "encoder_offset": lambda p, m, j: -p["offset"] * np.asarray(m.rigid.by_q)[:, :, j],
-    "joint_elasticity": lambda p, m, j: moved(m, j, swing(p, m, j)),
-    "backlash": lambda p, m, j: moved(m, j, flight(p, m, j)),
-    "contact": lambda p, m, j: -np.stack([
-        p["stiffness"] * max(p["position"] - n @ x, 0.0) * (J @ n)
-        for n in [np.array([p["normal_x"], p["normal_y"], p["normal_z"]])]
-        for x, J in zip(np.asarray(m.rigid.tool), np.asarray(m.rigid.tool_jacobian), strict=True)]),
-    "external_wrench": lambda p, m, j: -np.stack([
-        (1 / (1 + np.exp(-(t - p["t0"]) / 0.025)) - 1 / (1 + np.exp(-(t - p["t1"]) / 0.025)))
-        * (J @ [p["force_x"], p["force_y"], p["force_z"]])
-        for t, J in zip(np.asarray(m.t), np.asarray(m.rigid.tool_jacobian), strict=True)]),
-}  # fmt: skip
-
-every_effect = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=CATALOGUE.keys())
 every_dissipative_effect = pytest.mark.parametrize(
     "effect", [e for e in CATALOGUE.values() if e.dissipative], ids=lambda e: e.slug
 )
-KINDS = "SHSH"  # slides and hinges, two of each
-RESTING = 1e-9  # [rad/s or m/s]: sign(qd) is then rounded off nowhere along `motion`
-SCALES = Scales(
-    speed=np.array([0.4, 2.0, 0.5, 3.0]), rest_speed=np.array([1e-3, 2e-3, 1e-3, 1e-2]),
-    torque=np.array([50.0, 9.0, 20.0, 1.0]), duration=20.0,
-    low=np.array([-0.3, -2.0, -0.2, -1.0]), high=np.array([0.4, 1.0, 0.5, 2.0]),
-    inertia=np.array([20.0, 1.0, 3.0, 0.1]),
-)  # fmt: skip
-
-
-def rigid_body(rng, samples):
-    """Random sensitivities: columns must be right for any."""
-    n = len(KINDS)
-    across, _ = np.linalg.qr(rng.normal(size=(3, 2)))
-    shapes = ((samples, n, 3), (), None, (samples, n, 10), (samples, n, n), (samples, n, n), (n,), (samples, n, n),
-              (samples, 3), (samples, n, 3))  # fmt: skip
-    body = RigidBody(*(jnp.asarray(across.T if s is None else rng.normal(size=s)) for s in shapes))
-    # A link without inertia, or pushed away by its own motion, is no machine.
-    return eqx.tree_at(lambda r: (r.mass, r.by_qd, r.by_q), body, (
-        jnp.abs(body.mass) + 0.5, 0.1 * body.by_qd, 0.1 * body.by_q))
-
-
-def motion(seed=0, samples=60, rest_speed=RESTING):
-    """Random motion, no joint slower than 0.01."""
-    rng = np.random.default_rng(seed)
-    q, qd, qdd, load, total, *more = rng.normal(size=(8, samples, len(KINDS)))
-    qd += 0.01 * np.sign(qd)
-    arrays = [jnp.asarray(x) for x in (q, qd, qdd, 9 * load, 10 * total, *more)]
-    rigid = rigid_body(rng, samples)
-    speeds = jnp.full(len(KINDS), rest_speed)
-    direction = jnp.tanh(arrays[1] / speeds)
-    near_rest = {"rest_speed": speeds, "direction": direction}
-    return Motion(jnp.arange(samples) / 20.0, *arrays, rigid=rigid, **near_rest, recording=jnp.array(0.0))
-
-
-def robot():
-    return random_robot(KINDS, 1)[0]
-
-
-def a_shape(effect, joints=0):
-    """A shape in the middle of the grid."""
-    site = effect.sites(robot())[joints]
-    grid = effect.shapes(SCALES, site)
-    return jnp.asarray(site), jnp.asarray(grid[len(grid) // 2])
 
 
 def admissible(effect):
@@ -215,13 +61,6 @@ def admissible(effect):
         p.name: st.floats(max(p.low, -100.0), min(p.high, 100.0)).filter(lambda x: abs(x) > 1e-3)
         for p in effect.parameters
     })  # fmt: skip
-
-
-def some_values(effect, seed=0):
-    """Physical parameters away from zero, from one and from each other."""
-    rng = np.random.default_rng(seed)
-    values = {p.name: float(rng.uniform(max(p.low, 0.3) + 0.02, min(p.high, 2.0) - 0.02)) for p in effect.parameters}
-    return values | ({"recording": 1.0} if "recording" in values else {})  # the one that `motion` is
 
 
 def test_the_catalogue_holds_the_effects_of_the_vocabulary_and_no_other():
@@ -337,22 +176,6 @@ def test_amplitudes_are_recovered_from_their_physical_parameters(effect, seed):
     again, shape_again = effect.amplitudes(values)
     np.testing.assert_allclose(again, w, atol=1e-12)
     np.testing.assert_allclose(shape_again, shape, atol=1e-12)
-
-
-@every_effect
-def test_columns_are_the_formula_of_the_contract(effect):
-    for site in range(len(effect.sites(robot()))):
-        for seed in range(3):
-            joints, _ = a_shape(effect, site)
-            m, values = motion(seed), some_values(effect, seed)
-            w, shape = effect.amplitudes(values | SIGN)
-            torque = effect.columns(m, joints, jnp.asarray(shape)) @ jnp.asarray(w)
-            if effect.slug in LAWS_OF_MOTION:
-                law = LAWS_OF_MOTION[effect.slug](values, m, int(joints[0]))
-                np.testing.assert_allclose(torque, law, rtol=1e-10, atol=1e-10)
-                continue
-            along = (np.asarray(x)[:, joints] for x in (m.qd, m.qdd, m.load, m.total))
-            np.testing.assert_allclose(torque, LAWS[effect.slug](values, *along), rtol=1e-12, atol=1e-12)
 
 
 @every_effect

@@ -10,11 +10,13 @@ from irb140_jax.effects.base import AbstractEffect, Parameter
 
 CROSSINGS = (0.03, 0.3)  # s the link takes through the dead zone: less is not seen below 20 Hz, more is no gear
 RATIO = 1.12  # of neighbouring gaps in the first scan: a tenth more and the link hits the flank too late
-POINTS = 6  # gaps in the search, each with two flanks
-FLANKS = (0.8, 1.25)
+POINTS = 4  # gaps in the search, each with two flanks
+FLANKS = (0.5, 2.0)  # in the first grid, over that of the scan
+DAMPINGS = (0.12, 0.35, 1.0)  # in the first grid: a link bounces, or hardly does
+DAMPED = (0.03, 2.0)  # between which it is looked for
 MODE = 35.0  # Hz of the link on a flank, to begin with: above what is compared, so it only times the blows
 LEAST_GIVE = 0.05  # of the gap, by which a flank gives way under the joint's usual torque, at most
-FLANK_DAMPING = 0.15  # of the link on a flank, relative to critical: blows die out within a few swings
+FLANK_DAMPING = 0.3  # of the link on a flank, relative to critical, in the first scan
 ALIKE = 2.0  # times the torque that its gap accounts for: with more, play only stands in for something else
 STEPS = 4  # of the simulation per sample
 
@@ -23,16 +25,20 @@ class Backlash(AbstractEffect):
     """q_link = q - u: the link flies through the gap until a springy flank stops it.
 
     M d2u/dt2 + (d tau/dqd) du/dt + (d tau/dq) u = tau - flank(u), tau what the link would need on the motor's path and
-    flank(u) zero within +-gap/2.  u is simulated along the motion for a gap and a flank on the grid; its amplitude is
-    one where the grid has the right gap.  A spring of the
-    model pulls at the link, and so does what it is wrong by: a second column, k (q - u), nothing where there is none.
+    flank(u) zero within +-gap/2.  u is simulated along the motion for a gap, a flank and its damping on the grid; its
+    amplitude is one where the grid has the right gap.  A spring of the model pulls at the link, and so does what it is
+    wrong by: a second column, k (q - u), nothing where there is none.
     """
 
     slug = "backlash"
     title = "play between motor and link"
     equation = "-(d tau/dq_j u + d tau/dqd_j du/dt + M_j d2u/dt2), the link free within |u| <= gap/2"
     source = "Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38, 2002"
-    parameters = (Parameter("gap", "{q}", low=0.0), Parameter("flank_stiffness", "{tau}/{q}", low=0.0))
+    parameters = (
+        Parameter("gap", "{q}", low=0.0),
+        Parameter("flank_stiffness", "{tau}/{q}", low=0.0),
+        Parameter("flank_damping", "1", low=0.0),
+    )
     variants = ((0, 1),)
     own = (0,)
     confused_with = {
@@ -44,6 +50,7 @@ class Backlash(AbstractEffect):
     }
     needs = "the load on this joint changing sign, slowly and quickly"
     feigned = 0.06  # so does a flank at every step of an imperfect friction law
+    coarse = 3.0  # a flank gives way by some law of its own, and smoothing spreads the jolt that the motor takes
     leans_on_inertials = True
     transmission = True
     history = "flies from flank to flank, which takes a state of the link beside that of the motor"
@@ -64,25 +71,29 @@ class Backlash(AbstractEffect):
         # A link without inertia follows at once: then the way that the motor goes is the limit.
         largest = max(min(0.5 * torque / inertia * CROSSINGS[1] ** 3, high - low), 1e-12)
         gaps = largest * np.geomspace((CROSSINGS[0] / CROSSINGS[1]) ** 3, 1.0, self.scanned)
-        return np.stack([gaps, np.maximum(inertia * (2.0 * np.pi * MODE) ** 2, torque / (LEAST_GIVE * gaps))], axis=1)
+        flanks = np.maximum(inertia * (2.0 * np.pi * MODE) ** 2, torque / (LEAST_GIVE * gaps))
+        return np.stack([gaps, flanks, np.full(self.scanned, FLANK_DAMPING)], axis=1)
 
     def refines(self):
         return True
 
-    def around(self, best, ratio=RATIO):
-        near = best[0] * np.geomspace(1.0 / ratio, ratio, POINTS)
-        return np.array(list(itertools.product(near, best[1] * np.array(FLANKS))))
+    def around(self, best, ratio=RATIO, flanks=FLANKS, dampings=DAMPINGS):
+        gaps = best[0] * np.geomspace(1.0 / ratio, ratio, POINTS)
+        return np.array(list(itertools.product(gaps, best[1] * np.asarray(flanks), dampings)))
 
     def finer(self, grid, best):
-        gaps = np.unique(grid[:, 0])
-        return self.around(best, float(np.min(gaps[1:] / gaps[:-1])))
+        gaps, flanks, dampings = (np.unique(column) for column in grid.T)
+        nearer = np.array([-0.25, 0.25]), np.array([-0.5, 0.0, 0.5])
+        flanks, dampings = ((x[1] / x[0]) ** step for x, step in zip((flanks, dampings), nearer, strict=True))
+        return self.around(best, float(np.min(gaps[1:] / gaps[:-1])), flanks, np.clip(best[2] * dampings, *DAMPED))
 
     def columns(self, motion, joints, shape):
         rigid, dt = motion.rigid, motion.t[1] - motion.t[0]
         at = lambda x: jnp.take(x, joints, axis=2)[:, :, 0]  # noqa: E731
         own = lambda x: jnp.take(at(x), joints, axis=1)[:, 0]  # noqa: E731
         load = jnp.take(motion.carried, joints, axis=1)[:, 0]
-        u = _flight(load, own(rigid.mass), own(rigid.by_qd), own(rigid.by_q), 0.5 * shape[0], shape[1], dt)
+        link_side = load, own(rigid.mass), own(rigid.by_qd), own(rigid.by_q)
+        u = _flight(*link_side, shape[0], shape[1], shape[2], dt)
         # Differences hold the blows on the flanks as well.
         held = jnp.concatenate([u[:1], u, u[-1:]])
         rate, curve = (held[2:] - held[:-2]) / (2.0 * dt), (held[2:] - 2.0 * u + held[:-2]) / dt**2
@@ -96,7 +107,7 @@ class Backlash(AbstractEffect):
         return shape
 
     def amplitudes(self, values):
-        return np.array([1.0, 0.0]), np.array([values["gap"], values["flank_stiffness"]])
+        return np.array([1.0, 0.0]), np.array([values[p.name] for p in self.parameters])
 
     def lowest(self, robot, joints):
         return np.array([0.0, -1.0])
@@ -108,23 +119,25 @@ class Backlash(AbstractEffect):
         return f"{names}: wherever its load changes sign; a gap of {values['gap']:.3g} {units['gap']}"
 
 
-def _flight(load, mass, damping, spring, half, flank, dt):
-    """Displacement u (T,) of a link with springy flanks at +-half, beginning on the flank that the load presses on."""
-    h = dt / STEPS
+def _flight(load, mass, damping, spring, gap, flank, flank_damping, dt):
+    """Displacement u (T,) of a link with springy flanks at +-gap/2, beginning on the one that the load presses on."""
+    h, half = dt / STEPS, 0.5 * gap
 
     def sample(state, now):
         start, end, m, d, k = now
 
         def step(i, state):
             u, before = state
-            force = start + (end - start) * (i + 1.0) / STEPS
-            inertia = m / h**2
-            pull, stay = force + inertia * (2.0 * u - before) + d / h * u, inertia + d / h + k
-            free = pull / stay
+            inertia, rise = m / h**2, (end - start) / STEPS
+            known, stay = inertia * (2.0 * u - before) + d / h * u, inertia + d / h + k
+            # A second difference is of the middle of its three steps and a spring's bend of the last: so is their load.
+            load_at = lambda all_: start + rise * (i + 1.0 - inertia / all_)  # noqa: E731
+            free = (known + load_at(stay)) / stay
             touch = jnp.abs(free) > half
             # Within the flank the step is solved again with its spring and damper.
-            drag = 2.0 * FLANK_DAMPING * jnp.sqrt(flank * m) / h
-            pressed = (pull + flank * half * jnp.sign(free) + drag * u) / (stay + flank + drag)
+            drag = 2.0 * flank_damping * jnp.sqrt(flank * m) / h
+            held = stay + flank + drag
+            pressed = (known + load_at(held) + flank * half * jnp.sign(free) + drag * u) / held
             return jnp.where(touch, pressed, free), u
 
         state = lax.fori_loop(0, STEPS, step, state, unroll=True)

@@ -114,7 +114,7 @@ class AbstractEffect(abc.ABC):
         needs: The motion that would show the effect.
         feigned: Share of a joint's friction torque that other, imperfect laws may put into this effect's columns; less
             is no evidence for it.
-        formless: It has no law whose form could err, so that nothing is feigned by it.
+        coarse: How much more than others' its form errs, and feigns of them; 0 where it has no form that could.
         ordinary: Nearly every machine has it: rarer laws must beat it clearly.
         friction: It rubs inside the transmission, so it is no part of the load that the transmission carries.
         dissipative: It can only take energy out of the arm, at every instant.
@@ -150,7 +150,7 @@ class AbstractEffect(abc.ABC):
     confused_with: ClassVar[dict[str, str]] = {}
     needs: ClassVar[str]
     feigned: ClassVar[float] = 0.03
-    formless: ClassVar[bool] = False
+    coarse: ClassVar[float] = 1.0
     ordinary: ClassVar[bool] = False
     friction: ClassVar[bool] = False
     dissipative: ClassVar[bool] = False
@@ -258,8 +258,9 @@ class AbstractEffect(abc.ABC):
         del robot
         return np.ones(len(self.own))
 
-    def blur(self) -> np.ndarray:
-        """Standard deviation below which each physical parameter has no meaning, shape (p,)."""
+    def blur(self, shape: np.ndarray) -> np.ndarray:
+        """Standard deviation below which each physical parameter has no meaning at this shape, shape (p,)."""
+        del shape
         return np.zeros(len(self.parameters))
 
     def memory(self, q: Float[Array, " m"], tau: Float[Array, " m"]) -> Float[Array, " s"]:

@@ -24,7 +24,7 @@ class EncoderOffset(AbstractEffect):
         "gravity_spring": "the whole range of the joint: a spring is linear in position, gravity is not",
     }
     needs = "postures in which the slope of gravity over this joint changes sign; or its zero mark"
-    formless = True
+    coarse = 0.0
     leans_on_inertials = True
     everywhere = True
     mjcf = "the joint's ref"

@@ -8,8 +8,9 @@ from scipy import optimize
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
 
-RISE = 0.05  # s in which a push begins and ends
-BLUR = 0.035  # s: standard deviation of when a push begins and ends, as it may take up to 0.1 s to do so
+RISES = (0.01, 0.05)  # s in which a push begins and ends, in the first grid: a blow, or somebody leaning on the tool
+SHARPEST, SOFTEST = 0.004, 0.1  # between which it is looked for; what is sharper is beyond the low-pass
+BLUR = 0.8  # of its rise: standard deviation of when a push begins; an even ramp does 1.2 rises before its middle
 EDGES = 32  # instants per recording at which a push may begin or end in the first scan
 LONGEST = 0.4  # of a recording; what lasts longer is no event
 SHORTEST = 0.2  # s; what lasts less is a blow, or a misfit
@@ -33,6 +34,7 @@ class ExternalWrench(AbstractEffect):
         Parameter("force_x", "N"),
         Parameter("force_y", "N"),
         Parameter("force_z", "N"),
+        Parameter("rise", "s", low=0.0),
     )
     variants = ((0, 1, 2),)
     confused_with = {
@@ -53,18 +55,21 @@ class ExternalWrench(AbstractEffect):
 
     def shapes(self, scales, joints):
         starts = max(scales.duration, 1.0) * np.linspace(0.1, 0.8, len(NEAR) ** 2)
-        return np.stack([starts, starts + 0.1 * max(scales.duration, 1.0), np.ones_like(starts)], axis=1)
+        spans = np.stack([starts, starts + 0.1 * max(scales.duration, 1.0), np.ones_like(starts)], axis=1)
+        return np.concatenate([np.insert(spans, 3, rise, axis=1) for rise in RISES])
 
     def refines(self):
         return True
 
     def finer(self, grid, best):
-        at = np.sort(np.unique(np.abs(grid[:, 0] - best[0])))
-        return self._around(best, 0.5 * (at[1] if len(at) > 1 else STEP))
+        at, rises = np.sort(np.unique(np.abs(grid[:, 0] - best[0]))), np.unique(grid[:, 3])
+        apart = (rises[-1] / rises[0]) ** 0.25
+        return self._around(best[:3], 0.5 * (at[1] if len(at) > 1 else STEP), best[3] * np.array([1 / apart, apart]))
 
     @staticmethod
-    def _around(best, step):
-        at = np.array([best + step * np.array([a, b, 0.0]) for a, b in itertools.product(NEAR, NEAR)])
+    def _around(span, step, rises):
+        rises = np.clip(rises, SHARPEST, SOFTEST)
+        at = np.array([[*(span + step * np.array([a, b, 0])), r] for a, b, r in itertools.product(NEAR, NEAR, rises)])
         at[:, 1] = np.maximum(at[:, 1], at[:, 0] + SHORTEST)
         return at
 
@@ -81,7 +86,7 @@ class ExternalWrench(AbstractEffect):
                 continue
             first, last = np.searchsorted(t, spans.T)
             start = spans[np.argmax(left.gains_within(-J, first, last, rows))]
-            column = lambda span: -_window(t, span[0], span[1], np)[:, None, None] * J  # noqa: B023, E731
+            column = lambda span: -_window(t, span[0], span[1], RISES[-1], np)[:, None, None] * J  # noqa: B023, E731
             # A short simplex search moves both ends off the coarse grid.
             simplex = np.add(start, [[0, 0], [0.3, 0], [0, 0.3]])
             at = optimize.minimize(
@@ -90,25 +95,26 @@ class ExternalWrench(AbstractEffect):
             )  # fmt: skip
             if -at.fun > gain:
                 best, gain = np.array([*at.x, recording + 1.0]), -at.fun
-        return None if best is None else self._around(best, STEP)
+        return None if best is None else self._around(best, STEP, np.array(RISES))
 
     def alike(self, left, w, shape):
         _, size, axes = np.linalg.svd(left.tool_jacobian.reshape(-1, 3), full_matrices=False)
         unfelt = axes[size < UNFELT * max(size[0], 1e-300)] * np.linalg.norm(w)
-        return np.array([np.concatenate([shape, w + s * a]) for a in unfelt for s in (-1.0, 1.0)]).reshape(-1, 6)
+        return np.array([[*shape[:3], *(w + s * a), *shape[3:]] for a in unfelt for s in (-1.0, 1.0)]).reshape(-1, 7)
 
     def columns(self, motion, joints, shape):
         here = jnp.where(motion.recording + 1.0 == shape[2], 1.0, 0.0)
-        return -here * _window(motion.t, shape[0], shape[1], jnp)[:, None, None] * motion.rigid.tool_jacobian
+        return -here * _window(motion.t, shape[0], shape[1], shape[3], jnp)[:, None, None] * motion.rigid.tool_jacobian
 
     def physical(self, w, shape):
-        return jnp.concatenate([shape, w])
+        return jnp.concatenate([shape[:3], w, shape[3:]])
 
-    def blur(self):
-        return np.array([BLUR, BLUR, 0.0, 0.0, 0.0, 0.0])  # a push has no sharper beginning and end
+    def blur(self, shape):
+        edge = BLUR * float(shape[3])
+        return np.array([edge, edge, 0.0, 0.0, 0.0, 0.0, edge])
 
     def amplitudes(self, values):
-        shape = [values[k] for k in ("t0", "t1", "recording")]
+        shape = [values[k] for k in ("t0", "t1", "recording", "rise")]
         return np.array([values[f"force_{k}"] for k in "xyz"]), np.array(shape)
 
     def where(self, names, values, units):
@@ -119,6 +125,6 @@ class ExternalWrench(AbstractEffect):
         )
 
 
-def _window(t, t0, t1, xp):
+def _window(t, t0, t1, rise, xp):
     """1 between t0 and t1, 0 outside, with soft edges, shape (T,)."""
-    return 0.5 * (xp.tanh((t - t0) / RISE) - xp.tanh((t - t1) / RISE))
+    return 0.5 * (xp.tanh((t - t0) / rise) - xp.tanh((t - t1) / rise))

@@ -24,7 +24,7 @@ class GravityTilt(AbstractEffect):
         "encoder_offset": "a sweep of the first joint",
     }
     needs = "postures whose gravity torques don't all scale together, with the first joint swept"
-    formless = True
+    coarse = 0.0
     leans_on_inertials = True
     everywhere = True
     vector = True

@@ -24,7 +24,7 @@ class Payload(AbstractEffect):
         "torque_gain": "a known payload, on and off",
     }
     needs = "gravity and acceleration of the last link in several orientations"
-    formless = True
+    coarse = 0.0
     mjcf = "the last link's inertial"
     everywhere = True
     not_in_mjcf = ""

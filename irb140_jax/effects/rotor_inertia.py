@@ -20,7 +20,7 @@ class RotorInertia(AbstractEffect):
         "actuator_lag": "a friction reversal at several accelerations: a lag shifts it in time",
     }
     needs = "high acceleration of the joint, with the joints before it moving too"
-    formless = True
+    coarse = 0.0
     transmission = True
     mjcf = "joint armature"
     not_in_mjcf = ""

@@ -21,7 +21,7 @@ class TorqueOffset(AbstractEffect):
         "gravity_spring": "the whole range of the joint",
         "asymmetric_friction": "dwells: an offset stays at rest, friction does not",
     }
-    formless = True
+    coarse = 0.0
     transmission = True
     needs = "postures with clearly different gravity torque"
     mjcf = "joint stiffness and springref: a very soft spring, bent far"

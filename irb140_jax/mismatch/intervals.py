@@ -18,7 +18,19 @@ UNSEEN = 3.0  # a direction taken at random has six times as much of what isn't 
 def parameters_of(
     robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray, widen: float
 ) -> dict[str, Any]:
-    """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt."""
+    """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt.
+
+    Args:
+        robot: The nominal model.
+        ex: The explanation.
+        index: The finding among its candidates.
+        w: Amplitudes of the finding, shape (k,).
+        cov: Their covariance, shape (k, k).
+        widen: How much wider than by white noise they scatter over the recordings; so does its shape.
+
+    Returns:
+        By parameter: `value` and `std` in SI units, and the `unit`.
+    """
     c = ex.data.candidates[index]
     value = _physical(c, w)
     w, cov = _of_all_columns(ex, index, w, cov)
@@ -116,7 +128,7 @@ def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray, widen:
     # A posterior narrower than the grid is known to the grid's spacing.
     spacing = np.min(np.where(steps > 1e-9 * np.abs(value), steps, np.inf), axis=0, initial=np.inf)
     spacing = np.where(np.isfinite(spacing), spacing, 0.0)
-    return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + c.effect.blur() ** 2
+    return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + c.effect.blur(c.shape) ** 2
 
 
 def _variance_over_variants(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:

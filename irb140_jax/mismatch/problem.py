@@ -202,15 +202,15 @@ class Problem:
 
         Friction counts for one recording, on average: what its form errs by goes with warmth, load and motion, and
         resembles another law of friction in one recording by chance, not in all.  Whatever goes with position is the
-        same in all.  What has no form that could err does not count.
+        same in all.  A member counts as `AbstractEffect.coarse` as it is.
         """
         index = self.columns(chosen)
         if len(index) == 0:
             return np.zeros(len(self.per_joint))
         members = [self.candidates[c] for c in chosen]
-        counted = [not m.effect.formless and (m.effect.friction or not friction) for m in members]
+        counted = [m.effect.coarse if m.effect.friction or not friction else 0.0 for m in members]
         counts = np.concatenate([np.full(len(m.columns), c) for m, c in zip(members, counted, strict=True)])
-        v = np.where(counts, posterior(self.H, index).mean, 0.0)
+        v = counts * posterior(self.H, index).mean
         explained = np.einsum("i,jik,k->j", v, self.per_joint[:, index[:, None], index[None, :]], v)
         return 0.5 * explained / (self.motions if friction else 1.0)
 
