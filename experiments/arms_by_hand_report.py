@@ -66,9 +66,9 @@ def table(cases: list[dict], ordinary: tuple[str, ...] = (), *, by_law: bool = F
     what = lambda c: c["truth"][0]["effect"] if by_law else c["arm"]  # noqa: E731
     parts = dict.fromkeys(map(what, cases)) if by_law else ARMS
     apart = ["ordinary friction", "named"] if ordinary else []
-    heads = ["hidden" if by_law else "arm", "cases", "exact, nothing added", "hidden", "named", *apart]
-    heads.insert(5, "listed as not testable")
-    lines = [f"| {' | '.join([*heads, 'findings not there'])} |", "|---" * (len(heads) + 1) + "|"]
+    first = ["hidden" if by_law else "arm", "cases", "exact, nothing added", "hidden", "named"]
+    heads = [*first, "listed as not testable", *apart, "findings not there"]
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for name, part in [*((p, [c for c in cases if what(c) == p]) for p in parts), ("all", cases)]:
         laws = [(c, e) for c in part for e in c["truth"]]
         missed = [(c, e) for c in part for e in without(c["truth"], c["found"])]
@@ -84,8 +84,12 @@ def table(cases: list[dict], ordinary: tuple[str, ...] = (), *, by_law: bool = F
         for e in c["truth"]:
             own = found.get(key(e), {})
             values += [(own[k]["value"], own[k]["std"], v) for k, v in e["parameters"].items() if k in own and v]
-    error = np.median([abs(v / true - 1.0) for v, _, true in values])
-    cover = np.mean([abs(v - true) <= 1.645 * std for v, std, true in values])
+    figures = "No parameter to compare: nothing that was hidden is named."
+    if values:
+        error = 100 * np.median([abs(v / true - 1.0) for v, _, true in values])
+        cover = 100 * np.mean([abs(v - true) <= 1.645 * std for v, std, true in values])
+        figures = f"Median error of the parameters of what is named: {error:.2g} %; {cover:.0f} % of their 90 % "
+        figures += "intervals cover the truth."
     nothing = [c for c in cases if all(e["effect"] in ordinary for e in c["truth"])]
     false = sum(len(without(c["found"], c["truth"])) for c in nothing)
     more = "Nothing more was hidden" if ordinary else "Nothing was hidden"
@@ -94,8 +98,7 @@ def table(cases: list[dict], ordinary: tuple[str, ...] = (), *, by_law: bool = F
         *lines,
         "",
         *clear,
-        "Median error of the parameters of what is named:",
-        f"{100 * error:.2g} %; {100 * cover:.0f} % of their 90 % intervals cover the truth.",
+        figures,
         "",
         "### Every case that is not exact",
         "",

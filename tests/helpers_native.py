@@ -46,37 +46,40 @@ def recorded(
     xml: str, hide: Callable[[mujoco.MjModel], None], rng: np.random.Generator, seconds: float = 12.0,
     under: Callable[[mujoco.MjModel, np.ndarray], None] = lambda model, load: None,
     pushed: Callable[[float, mujoco.MjData], None] = lambda t, plant: None,
+    truly: str = "",
 ) -> Recording:  # fmt: skip
     """A sum of sines under computed torque and proportional-derivative feedback; torques with 1 % of noise.
 
     What a model is under the torques that reach its links (`under`) it becomes before every step, and is `pushed`.
+    The true arm may be another (`truly`), with joints of its own that no motor drives.
     """
-    nominal, true = model_of(xml), model_of(xml)
+    nominal, true = model_of(xml), model_of(truly or xml)
     hide(true)
     n = nominal.nv
+    names = tuple(nominal.joint(j).name for j in range(n))
+    driven = [true.joint(name).dofadr[0] for name in names]
     model, plant, torque = mujoco.MjData(nominal), mujoco.MjData(true), np.zeros(n)
     low, high = nominal.jnt_range.T
     middle, reach = 0.5 * (low + high), 0.3 * (high - low)
     rate, phase = 2.0 * np.pi * rng.uniform(0.15, 0.8, (3, n)), rng.uniform(0.0, 2.0 * np.pi, (3, n))
     wave = lambda f, t, power: reach * np.mean(f(rate * t + phase) * rate**power, axis=0)  # noqa: E731
-    plant.qpos[:], plant.qvel[:] = middle + wave(np.sin, 0.0, 0), wave(np.cos, 0.0, 1)
+    plant.qpos[driven], plant.qvel[driven] = middle + wave(np.sin, 0.0, 0), wave(np.cos, 0.0, 1)
     q, tau = [], []
     times = np.arange(0.0, seconds, 0.001)
     for t in times:
-        off = middle + wave(np.sin, t, 0) - plant.qpos, wave(np.cos, t, 1) - plant.qvel
-        model.qpos[:], model.qvel[:] = plant.qpos, plant.qvel
+        model.qpos[:], model.qvel[:] = plant.qpos[driven], plant.qvel[driven]
+        off = middle + wave(np.sin, t, 0) - model.qpos, wave(np.cos, t, 1) - model.qvel
         mujoco.mj_forward(nominal, model)
         mujoco.mj_mulM(nominal, model, torque, -wave(np.sin, t, 2) + 40.0 * off[1] + 400.0 * off[0])
         torque += model.qfrc_bias
-        plant.qfrc_applied[:] = torque
-        q.append(plant.qpos.copy())
+        plant.qfrc_applied[driven] = torque
+        q.append(model.qpos.copy())
         tau.append(torque.copy())
-        under(true, torque + plant.qfrc_constraint)
+        under(true, torque + plant.qfrc_constraint[driven])
         pushed(t, plant)
         mujoco.mj_step(true, plant)
     q, tau = np.array(q)[::2], np.array(tau)[::2]
     noise = 0.01 * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)
-    names = tuple(nominal.joint(j).name for j in range(n))
     return Recording(times[::2], q + 1e-5 * rng.normal(size=q.shape), tau + noise, names, source="native")
 
 

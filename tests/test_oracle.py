@@ -10,6 +10,7 @@ from helpers import random_robot, random_robot_xml, random_state, shipped_robot
 from irb140_jax import dynamics, kinematics
 from irb140_jax.errors import RobotError
 from irb140_jax.oracle import mujoco as oracle
+from irb140_jax.robot import robot_from_model
 
 
 @pytest.fixture(scope="session")
@@ -50,6 +51,18 @@ def test_ours_agrees_with_mjx(mjx_opinion):
     assert np.allclose(ours, bias, atol=1e-11)
     assert np.allclose(dynamics.inverse_dynamics(robot, q, qd, qdd), tau, atol=1e-11)
     assert np.allclose(kinematics.forward_kinematics(robot, q), T, atol=1e-13)
+
+
+def test_the_tool_that_no_site_marks_is_the_last_centre_of_mass():
+    from irb140_jax.oracle import mjx
+
+    arm = '<mujoco><worldbody><body><joint name="a"/><geom size=".1" pos="0 .1 .3"/></body></worldbody></mujoco>'
+    model = mujoco.MjModel.from_xml_string(arm)
+    robot, at, q = robot_from_model(model), np.array([0.7]), jnp.array([0.7])
+    T = oracle.forward_kinematics(model, at)
+    assert np.allclose(kinematics.forward_kinematics(robot, q), T, atol=1e-13)
+    assert np.allclose(jax.jit(mjx.forward_kinematics)(mjx.oracle_model(model), q), T, atol=1e-13)
+    assert np.allclose(kinematics.jacobian(robot, q), oracle.jacobian(model, at), atol=1e-13)
 
 
 @pytest.mark.parametrize(

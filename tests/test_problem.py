@@ -5,13 +5,18 @@ import pytest
 from helpers_problem import ROWS, TURNS, WAVE, problem
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.problem import LEAST_SHARE
+from irb140_jax.mismatch.problem import UNSURE, Problem
 
 
 def explained_by_friction(level: float) -> float:
     """Half the squared torque of a Coulomb friction fitted with a prior of one."""
     w = level * ROWS / (ROWS + 1.0)
     return 0.5 * w**2 * ROWS
+
+
+def unsure(of: Problem, joint: int = 0) -> float:
+    """What smoothing may put at a joint, whatever the laws there."""
+    return 0.5 * UNSURE**2 * of.torque_energy[:, joint].sum()
 
 
 FRICTION = ("coulomb_friction", (0,), [TURNS])
@@ -25,18 +30,25 @@ def test_what_has_no_form_that_could_err_feigns_nothing(slug):
     y = np.atleast_2d(3.0 * np.ones(ROWS) + 2.0 * TURNS)
     there = problem([own, FRICTION, RARER, SPRING], y)
     assert np.all(there.explained((0,)) == 0.0)
-    assert np.all(there.feigned((0,), 1e6) == 0.0)
+    np.testing.assert_allclose(there.feigned((0,), 1e6), unsure(there), rtol=1e-12)
     X = np.stack([np.ones(ROWS), TURNS], axis=1)
     w = np.linalg.solve(X.T @ X + np.eye(2), X.T @ y[0])
     assert there.explained((0, 1))[0] == pytest.approx(0.5 * w[1] ** 2 * ROWS)
+
+
+def test_play_feigns_as_much_as_a_law_of_so_many_times_its_torque():
+    ripple, play = (problem([(slug, (0,), [WAVE]), SPRING], 5.0 * WAVE[None]) for slug in ("torque_ripple", "backlash"))
+    most, of_play = (there.feigned((0,), 1e6)[1] - unsure(there) for there in (ripple, play))
+    assert CATALOGUE["backlash"].coarse > 1.0 and most > 0.0
+    assert of_play == pytest.approx(CATALOGUE["backlash"].coarse ** 2 * most)
 
 
 def test_friction_feigns_friction_in_one_recording_and_anything_else_in_all():
     y = 5.0 * TURNS[None]
     one, three = (problem([FRICTION, RARER, SPRING], y, n) for n in (1, 3))
     feigned = explained_by_friction(5.0) * np.array([CATALOGUE[s].feigned ** 2 for s in (RARER[0], SPRING[0])])
-    np.testing.assert_allclose(one.feigned((0,), 1e6)[1:], feigned, rtol=1e-9)
-    np.testing.assert_allclose(three.feigned((0,), 1e6)[1:], feigned / [3.0, 1.0], rtol=1e-9)
+    np.testing.assert_allclose(one.feigned((0,), 1e6)[1:] - unsure(one), feigned, rtol=1e-9)
+    np.testing.assert_allclose(three.feigned((0,), 1e6)[1:] - unsure(three), feigned / [3.0, 1.0], rtol=1e-9)
 
 
 def test_no_more_is_feigned_at_a_joint_than_comes_from_there():
@@ -47,13 +59,28 @@ def test_no_more_is_feigned_at_a_joint_than_comes_from_there():
     part = 0.01 / 1.01  # of its squared torque on the joint that rubs
     assert of_friction > 10.0 * part * 100.0
     assert there.feigned((0,), 100.0)[1] == pytest.approx(part * 100.0)
-    assert there.feigned((0,), 1e9)[1] == pytest.approx(of_friction)
+    assert there.feigned((0,), 1e9)[1] == pytest.approx(of_friction + unsure(there, 0))
     assert there.feigned((0,), -5.0)[1] == 0.0
 
 
-def test_what_comes_once_may_be_small_over_all():
-    tiny = 0.5 * LEAST_SHARE
-    y = WAVE + tiny * TURNS
+def test_a_thousandth_of_the_torque_is_feigned_for_all_but_what_comes_once():
     members = [("external_wrench", (0,), [TURNS]), ("torque_ripple", (0,), [TURNS])]
-    scores = problem(members, 1e4 * y[None]).scores(())
-    assert np.isfinite(scores).tolist() == [True, False]
+    there = problem(members, 1e4 * WAVE[None])
+    np.testing.assert_allclose(there.feigned((), 1e9), [0.0, unsure(there)], rtol=1e-12)
+    assert unsure(there) == pytest.approx(0.5 * np.sum((10.0 * WAVE) ** 2))
+
+
+def test_what_acts_on_several_joints_must_come_from_more_than_a_thousandth_of_the_torque_of_each():
+    delay = ("time_delay", (0, 1), [WAVE, WAVE])
+    there = problem([delay], 1e4 * np.stack([WAVE, 3.0 * WAVE]))
+    one, other = unsure(there, 0), unsure(there, 1)
+    assert there.feigned((), 1e9)[0] == pytest.approx(one + other)
+    assert there.feigned((), 0.1 * one)[0] == pytest.approx(0.1 * one)  # no more than it says
+
+
+def test_what_is_named_after_one_joint_and_felt_at_two_is_held_to_as_much_as_a_rival_named_after_both():
+    felt = [WAVE, 0.5 * WAVE]
+    there = problem([("gravity_tilt", (0, 1), felt), ("encoder_offset", (0,), felt)], 1e4 * np.stack([WAVE, WAVE]))
+    for odds in (0.5, 50.0, 1e9):
+        of_both, of_one = there.feigned((), odds)
+        assert of_both == pytest.approx(of_one, rel=1e-12) and of_both > 0.0

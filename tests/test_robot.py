@@ -170,6 +170,12 @@ def test_urdf_keeps_friction_and_limits_and_merges_what_is_fixed(tmp_path):
     assert np.allclose(robot.base_position, [0, 0, 0.5])
 
 
+def test_tool_is_the_centre_of_mass_where_the_file_names_none(tmp_path):
+    arm = '<mujoco><worldbody><body><joint name="a"/><geom size=".1" pos="0 0 .3"/>{}</body></worldbody></mujoco>'
+    assert np.allclose(read(tmp_path, arm.format(""), "arm.xml").tool_position, [0, 0, 0.3])
+    assert np.allclose(read(tmp_path, arm.format("<site/>"), "arm.xml").tool_position, 0)  # named, so meant
+
+
 def test_urdf_axis_is_x_where_it_is_not_given(tmp_path):
     robot = read(tmp_path, urdf(), "bench.urdf")
     assert np.allclose(robot.axis[1], [1, 0, 0])

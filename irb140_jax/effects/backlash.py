@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.base import ALIKE, AbstractEffect, Parameter
 
 CROSSINGS = (0.03, 0.3)  # s the link takes through the dead zone: less is not seen below 20 Hz, more is no gear
 RATIO = 1.12  # of neighbouring gaps in the first scan: a tenth more and the link hits the flank too late
@@ -17,7 +17,6 @@ DAMPED = (0.03, 2.0)  # between which it is looked for
 MODE = 35.0  # Hz of the link on a flank, to begin with: above what is compared, so it only times the blows
 LEAST_GIVE = 0.05  # of the gap, by which a flank gives way under the joint's usual torque, at most
 FLANK_DAMPING = 0.3  # of the link on a flank, relative to critical, in the first scan
-ALIKE = 2.0  # times the torque that its gap accounts for: with more, play only stands in for something else
 STEPS = 4  # of the simulation per sample
 
 

@@ -18,6 +18,10 @@ from irb140_jax.effects.left_over import LeftOver
 from irb140_jax.robot import Robot
 from irb140_jax.types import Joints, JointSamples, Samples, Scalar
 
+# Times the torque that the shape of a simulated link accounts for: beyond, it stands in for something else, as a spring
+# of a quarter of its bend does for what smoothing takes off accelerations.
+ALIKE = 2.0
+
 
 class RigidBody(eqx.Module):
     """Sensitivities of the nominal rigid body's torque along a motion.

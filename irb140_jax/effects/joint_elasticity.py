@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from irb140_jax.effects.base import AbstractEffect, Parameter, geometric_grid
+from irb140_jax.effects.base import ALIKE, AbstractEffect, Parameter, geometric_grid
 
 DAMPING = 0.05  # of the link on its spring, relative to critical: what harmonic drives show (Spong; Tuttle and Seering)
 MODES = (6.0, 80.0)  # Hz; softer is no robot, stiffer moves nothing below 20 Hz
@@ -15,8 +15,8 @@ NUMERICAL_DAMPING = 0.05  # Newmark's gamma beyond 1/2: takes out modes that the
 class JointElasticity(AbstractEffect):
     """q_link = q - u, with u the bend of the spring: M d2u/dt2 + (d tau/dqd + D) du/dt + (d tau/dq + K) u = tau.
 
-    The link swings on its spring, so u is simulated along the motion: v = K u by Newmark's rule for a compliance 1/K on
-    the grid; the amplitude is the compliance, equal to that of the grid where the grid has the right one.
+    The link swings on its spring, so u is simulated along the motion by Newmark's rule for a compliance 1/K on the
+    grid; the amplitude is one where the grid has the right one.
     """
 
     slug = "joint_elasticity"
@@ -53,16 +53,19 @@ class JointElasticity(AbstractEffect):
         damping = 2.0 * DAMPING * jnp.sqrt(shape[0] * mass) + shape[0] * own(rigid.by_qd)
         v = _swing(load, shape[0] * mass, damping, 1.0 + shape[0] * own(rigid.by_q), dt)
         bend, rate, curve = (x[:, None] for x in v)
-        return -(at(rigid.by_q) * bend + at(rigid.by_qd) * rate + at(rigid.mass) * curve)[:, :, None]
+        return -shape[0] * (at(rigid.by_q) * bend + at(rigid.by_qd) * rate + at(rigid.mass) * curve)[:, :, None]
 
     def physical(self, w, shape):
-        return 1.0 / jnp.where(w == 0.0, 1e-12, w)
+        return 1.0 / (jnp.where(w == 0.0, 1e-12, w) * shape)
 
     def amplitudes(self, values):
-        return np.array([1.0 / values["stiffness"]]), np.array([1.0 / values["stiffness"]])
+        return np.ones(1), np.array([1.0 / values["stiffness"]])
 
     def lowest(self, robot, joints):
-        return np.zeros(1)
+        return np.array([1.0 / ALIKE])
+
+    def highest(self, robot, joints):
+        return np.array([ALIKE])
 
     def where(self, names, values, units):
         stiffness = f"{values['stiffness']:.3g} {units['stiffness']}"

@@ -10,7 +10,7 @@ import numpy as np
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.evidence import Layout, gain_of, gains, layouts, posterior, with_prior
 
-LEAST_SHARE = 0.005  # an effect below this share of its joint's torque is within what smoothing and geometry feign
+UNSURE = 1e-3  # of a joint's torque: what smoothing, and control in steps, may put anywhere, however exact the log
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,11 +50,6 @@ class Problem:
     highest: np.ndarray
     summed: np.ndarray
     least: np.ndarray
-
-    @cached_property
-    def least_share(self) -> np.ndarray:
-        """Least share of its joint's torque that each candidate may have; none for what comes once and goes."""
-        return np.array([0.0 if c.effect.once else LEAST_SHARE for c in self.candidates])
 
     def columns(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Columns of H that a set uses."""
@@ -109,7 +104,7 @@ class Problem:
         with np.errstate(invalid="ignore"):
             bad = np.any((mean < self.lowest - 1e-9) | (mean > self.highest + 1e-9), axis=1)
         bad |= np.nansum(mean * self.summed, axis=1) < self.least
-        return np.where(bad | (self._share(mean) < self.least_share), -np.inf, gain + self.log_prior)
+        return np.where(bad, -np.inf, gain + self.log_prior)
 
     def eliminated_near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
         """Gram matrix of some columns and y, with a set eliminated."""
@@ -145,10 +140,6 @@ class Problem:
     def _neighbourhoods(self) -> dict[frozenset[int] | None, "Neighbourhood"]:
         return {}
 
-    def _share(self, mean: np.ndarray) -> np.ndarray:
-        """Torque of each candidate with these amplitudes, as a share of the torque of the joint it matters most to."""
-        return np.sqrt(np.max(self._energy(mean) / self.torque_energy.sum(axis=0)[:, None], axis=0))
-
     def _energy(self, mean: np.ndarray) -> np.ndarray:
         """Squared whitened torque of each candidate with these amplitudes at each joint, shape (n, candidates)."""
         energy = np.zeros((len(self.per_joint), len(self.candidates)))
@@ -176,7 +167,8 @@ class Problem:
 
         Friction is feigned by friction: what tilts, weighs or springs does not turn with the direction of motion.  What
         acts on several joints may be feigned at each, for reversals that encoders do not see are late at all of them;
-        but no more at a joint than comes from there.
+        but no more at a joint than comes from there.  What is `UNSURE` of the torque itself may feign anything, but for
+        what comes once and goes.
 
         Args:
             chosen: The set.
@@ -191,7 +183,23 @@ class Problem:
             self._last[chosen] = most, self.parts(chosen)
         most, parts = self._last[chosen]
         alone = self.at_joint.sum(axis=0) == 1
-        return np.where(alone, most, np.minimum(most, np.maximum(odds, 0.0) * parts)).sum(axis=0)
+        # What is named after one joint may be felt at others, as much as its rivals that are named after all.
+        from_there = np.maximum(odds, 0.0) * np.where(alone, self._felt, parts)
+        of_one = most + np.minimum(self._unsure, from_there)
+        return np.where(alone, of_one, np.minimum(most + self._unsure, from_there)).sum(axis=0)
+
+    @cached_property
+    def _unsure(self) -> np.ndarray:
+        """Half the whitened square of `UNSURE` of the torque at each joint, shape (n, candidates)."""
+        lasting = np.array([not c.effect.once for c in self.candidates])
+        return 0.5 * UNSURE**2 * self.torque_energy.sum(axis=0)[:, None] * lasting
+
+    @cached_property
+    def _felt(self) -> np.ndarray:
+        """Part of each candidate's squared torque at each joint, all its amplitudes alike, shape (n, candidates)."""
+        square = np.diagonal(self.per_joint, axis1=1, axis2=2)
+        felt = np.stack([square[:, c.columns + self.offset].sum(axis=1) for c in self.candidates], axis=1)
+        return felt / np.maximum(felt.sum(axis=0), 1e-300)
 
     @cached_property
     def _last(self) -> dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]]:

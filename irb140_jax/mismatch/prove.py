@@ -196,11 +196,10 @@ def jackknife_factor(ex: Explanation) -> np.ndarray:
     left_out = [np.arange(blocks) == b for b in range(blocks)]
     posts = [full_posterior(ex.data, ex.problem, ex.grams, ex.chosen, b) for b in left_out]
     known, means = np.maximum(np.diag(whole.cov), 1e-300), np.array([p.mean for p in posts])
-    weight = np.full(means.shape, blocks - 1.0)
-    rare = [np.full(len(m.columns), m.effect.once) for m in ex.members]
-    once = np.concatenate([np.full(ex.data.nuisances, False), *rare])
+    each = [np.full(len(m.columns), m.effect.once) for m in ex.members]
+    once = np.concatenate([np.full(ex.data.nuisances, False), *each])
     share = np.maximum(1.0 - known / [np.diag(p.cov) for p in posts], MOST_OF_IT)
-    weight = np.where(once & (share > MOST_OF_IT), (1.0 - share) / share, weight)
+    weight = np.where(once & (share > MOST_OF_IT), (1.0 - share) / share, blocks - 1.0)
     centre = np.where(once, whole.mean, means.mean(axis=0))
     variance = np.sum(weight * (means - centre) ** 2, axis=0) / blocks
     return np.sqrt(np.maximum(variance / known, 1.0))

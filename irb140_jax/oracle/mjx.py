@@ -79,13 +79,16 @@ def bias(model: mjx.Model, q: Joints, qd: Joints) -> Joints:
 def forward_kinematics(model: mjx.Model, q: Joints) -> Pose:
     """Pose of the tool in the world: the model's last site, or without sites its last body.
 
+    Of a body with a joint, the centre of mass: its own frame lies on the joint.
+
     Args:
         model: From `oracle_model`.
         q: Joint positions [rad or m], shape (n,).
     """
     data = mjx.kinematics(model, mjx.make_data(model).replace(qpos=q))
     rotation = (data.site_xmat if model.nsite else data.xmat)[-1].reshape(3, 3)
-    position = (data.site_xpos if model.nsite else data.xpos)[-1]
+    bodies = data.xipos if model.body_jntnum[-1] else data.xpos
+    position = (data.site_xpos if model.nsite else bodies)[-1]
     return jnp.eye(4).at[:3, :3].set(rotation).at[:3, 3].set(position)
 
 

@@ -111,7 +111,7 @@ def passive(model: mujoco.MjModel, q: Vector, qd: Vector) -> Vector:
 
 
 def forward_kinematics(model: mujoco.MjModel, q: Vector) -> Float[np.ndarray, "4 4"]:
-    """Pose of the tool in the world: the model's last site, or without sites its last body.
+    """Pose of the tool in the world: the model's last site, or without sites its last body (see `_point`).
 
     Args:
         model: From `oracle_model`.
@@ -121,8 +121,15 @@ def forward_kinematics(model: mujoco.MjModel, q: Vector) -> Float[np.ndarray, "4
     mujoco.mj_kinematics(model, data)
     T = np.eye(4)
     T[:3, :3] = (data.site_xmat if model.nsite else data.xmat)[-1].reshape(3, 3)
-    T[:3, 3] = (data.site_xpos if model.nsite else data.xpos)[-1]
+    T[:3, 3] = _point(model, data)
     return T
+
+
+def _point(model: mujoco.MjModel, data: mujoco.MjData) -> Vector:
+    """Where the last site is; without sites, where the last body is, or if it has a joint, its centre of mass."""
+    if model.nsite:
+        return data.site_xpos[-1]
+    return (data.xipos if model.body_jntnum[-1] else data.xpos)[-1]
 
 
 def jacobian(model: mujoco.MjModel, q: Vector) -> Float[np.ndarray, "6 n"]:
@@ -137,8 +144,7 @@ def jacobian(model: mujoco.MjModel, q: Vector) -> Float[np.ndarray, "6 n"]:
     mujoco.mj_comPos(model, data)
     J = np.zeros((6, model.nv))
     body = model.site_bodyid[-1] if model.nsite else model.nbody - 1
-    point = data.site_xpos[-1] if model.nsite else data.xpos[-1]
-    mujoco.mj_jac(model, data, J[:3], J[3:], point, int(body))
+    mujoco.mj_jac(model, data, J[:3], J[3:], _point(model, data), int(body))
     return J
 
 

@@ -94,15 +94,16 @@ def _body_inertial(
     return float(model.body_mass[body]), centre, A @ np.diag(model.body_inertia[body]) @ A.T
 
 
-def tool_frame(model: mujoco.MjModel, chain: RestingChain) -> tuple[np.ndarray, np.ndarray]:
+def tool_frame(model: mujoco.MjModel, chain: RestingChain, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Orientation, shape (3, 3), and position [m], shape (3,), of the tool in the last link's frame.
 
     The tool is the last site on the last link; without one, the last body welded to it (a URDF's tool0); without
-    one, the link's own frame.
+    one, the link's centre of mass, for the link's own frame lies on the joint, where a push moves nothing.
 
     Args:
         model: Compiled model of a serial chain.
         chain: Its frames at rest.
+        centre: Centre of mass of the last link in its frame [m], shape (3,).
     """
     last = model.njnt - 1
     to_link, own = chain.frame[-1].T, int(model.jnt_bodyid[-1])
@@ -110,7 +111,7 @@ def tool_frame(model: mujoco.MjModel, chain: RestingChain) -> tuple[np.ndarray, 
     sites = [s for s in range(model.nsite) if int(model.site_bodyid[s]) in carried]
     body = int(model.site_bodyid[sites[-1]]) if sites else carried[-1]
     if not sites and body == own:
-        return np.eye(3), np.zeros(3)
+        return np.eye(3), centre
     R, p = chain.data.xmat[body].reshape(3, 3), chain.data.xpos[body]
     if sites:
         site_R = np.zeros(9)

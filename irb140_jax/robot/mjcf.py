@@ -66,7 +66,7 @@ def robot_from_model(
     spring, damper = _enabled(model, "SPRING"), _enabled(model, "DAMPER")
     dry = _enabled(model, "FRICTIONLOSS") * _enabled(model, "CONSTRAINT")
     gravity = _enabled(model, "GRAVITY") * model.opt.gravity
-    tool_rotation, tool_position = tool_frame(model, chain)
+    tool_rotation, tool_position = tool_frame(model, chain, com[-1])
     fields = dict(
         rotation=chain.rotation, position=chain.position, axis=model.jnt_axis, reference=model.qpos0,
         mass=mass, com=com, inertia=inertia,
