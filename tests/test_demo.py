@@ -64,6 +64,14 @@ def test_the_hidden_effect_is_named_on_its_joint_and_nothing_else(demo):
     assert said.index(truth["seal"]) < said.index("The truth, now revealed")
 
 
+def test_a_rival_of_a_part_of_the_law_says_what_stays(demo):
+    (finding,) = json.loads((demo[0] / "diagnosis.json").read_text())["findings"]
+    assert finding["effect"] == "asymmetric_friction"
+    (offset,) = [a for a in finding["alternatives"] if a["effect"] == "torque_offset"]
+    # Alone it would not turn with the direction of motion.
+    assert "Coulomb friction is there in either case" in offset["separate_by"]
+
+
 def test_the_diagnosis_has_the_form_of_the_contract(demo):
     diagnosis = json.loads((demo[0] / "diagnosis.json").read_text())
     keys = {"schema", "verdict", "findings", "unexplained", "not_testable", "fit", "summary"}

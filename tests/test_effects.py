@@ -139,8 +139,8 @@ def test_shape_grids_stand_for_a_joint_that_never_moves(effect):
     still = Scales(none, np.full(len(KINDS), 1e-6), np.full(len(KINDS), 1e-12), none, none, 0.0,
                    np.full(len(KINDS), 1e-12))
     for joints in effect.sites(robot()):
-        for shape in effect.shapes(still, joints):
-            assert np.isfinite(effect.columns(motion(), jnp.asarray(joints), jnp.asarray(shape))).all()
+        columns = jax.vmap(effect.columns, (None, None, 0))
+        assert np.isfinite(columns(motion(), jnp.asarray(joints), jnp.asarray(effect.shapes(still, joints)))).all()
 
 
 @every_effect

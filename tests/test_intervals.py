@@ -1,9 +1,14 @@
 """Intervals of physical parameters: what the doubt about amplitudes makes of them."""
 
+import dataclasses
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
+from helpers_problem import ROWS, problem
 
-from irb140_jax.mismatch.intervals import _variance_of
+from irb140_jax.mismatch.intervals import _variance_about_shape, _variance_of
 
 
 def test_the_variance_of_what_is_linear_is_exact():
@@ -20,3 +25,25 @@ def test_a_tilt_of_which_one_component_shows_is_not_known_by_its_size(unseen):
     drawn = size(w + std * np.random.default_rng(1).normal(size=(20_000, 2)))
     expected = np.mean((drawn - 0.015) ** 2)
     assert _variance_of(size, w, np.diag(std**2), np.array([0.015]))[0] == pytest.approx(expected, rel=0.35)
+
+
+def test_a_wall_that_leans_and_stands_off_is_known_as_both_free_at_once_allow():
+    # The tool is at x, always behind the wall: the push is stiffness times (position - n . x), in one joint.
+    stiffness, wall = 50.0, np.array([1.0, 0.0, 0.0, 3.0])
+    x = np.array([2.0, 1.0, 0.0]) + np.random.default_rng(2).normal(size=(ROWS, 3)) * [0.1, 0.1, 0.0]
+    push = lambda shape: shape[3] - x @ shape[:3]  # noqa: E731
+    turns = 1e-4 * np.array([[0.0, 1.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, -1.0]])
+    shapes = wall + np.vstack([np.zeros(4), turns])
+    made = problem([("contact", (0,), [push(s)]) for s in shapes], [stiffness * push(wall)])
+    walls = tuple(dataclasses.replace(c, shape=s) for c, s in zip(made.candidates, shapes, strict=True))
+    made = dataclasses.replace(made, candidates=walls)
+    data = SimpleNamespace(candidates=walls, nuisances=0, scale=np.full(len(walls), 1.0))
+    explanation = cast(Any, SimpleNamespace(problem=made, data=data, chosen=(0,)))
+    found = _variance_about_shape(explanation, 0, np.array([stiffness]), 1.0)
+    # Least squares over stiffness, lean and position, from the derivatives written out.
+    slope = np.stack([push(wall), -stiffness * x[:, 1], np.full(ROWS, stiffness)], axis=1)
+    cov = np.linalg.inv(slope.T @ slope + np.diag([1.0, 0.0, 0.0]))
+    np.testing.assert_allclose(found[[0, 2, 4]], np.diag(cov), rtol=1e-3)
+    alone = 1.0 / np.sum(slope**2, axis=0)
+    assert np.all(found[[2, 4]] > 10.0 * alone[1:])  # moved one at a time, both seem far better known
+    assert found[1] == 0.0 and found[3] == 0.0  # nothing was turned that way

@@ -15,6 +15,8 @@ from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.robot import Robot
 
+Key = tuple[str, tuple[int, ...]]  # an effect and its joints
+
 WORTH_SAYING = 0.02  # alternatives less probable than this stay unsaid
 
 
@@ -54,8 +56,11 @@ def _evidence(ex: Explanation, index: int) -> dict[str, float]:
     return {"delta_bic": drop - len(columns) * float(np.log(ex.grams.rows.sum())), "heldout_gain": share}
 
 
-def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], float]:
-    """Log odds of every effect that could stand in a finding's place, and of none (slug "")."""
+def _rivals(ex: Explanation, index: int) -> tuple[dict[Key, float], dict[Key, str]]:
+    """Log odds of every effect that could stand in a finding's place, and of none (slug "").
+
+    Beside them the special case of the named law that stays where an effect takes the place of the rest only.
+    """
     c = ex.data.candidates[index]
     rest = others(ex, index)
     taken = {(ex.data.candidates[i].slug, ex.data.candidates[i].joints) for i in rest}
@@ -81,16 +86,18 @@ def _rivals(ex: Explanation, index: int) -> dict[tuple[str, tuple[int, ...]], fl
             odds[key] = own + min(excess, 0.0) - PREFER * guard / hurdle * (1.0 - max(excess, 0.0) / hurdle)
         elif abs(excess) <= guard:
             odds[key] = own  # within what an imperfect law could feign, a rival is as good as the named law
-    for key, value in _pairs(ex, rest, c).items():
-        odds[key] = max(odds.get(key, -np.inf), min(value, own))
+    stays: dict[Key, str] = {}
+    for key, (value, special) in _pairs(ex, rest, c).items():
+        if min(value, own) > odds.get(key, -np.inf):
+            odds[key], stays[key] = min(value, own), special
     odds["", ()] = 0.0
     # What the search preferred by its own rules is at least as probable as what it did not take.
-    return {key: value if key == (c.slug, c.joints) else min(value, own) for key, value in odds.items()}
+    return {key: value if key == (c.slug, c.joints) else min(value, own) for key, value in odds.items()}, stays
 
 
-def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[tuple[str, tuple[int, ...]], float]:
-    """Log odds of a special case of the named law together with one more effect, under the latter's name."""
-    odds: dict[tuple[str, tuple[int, ...]], float] = {}
+def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[Key, tuple[float, str]]:
+    """Log odds of a special case of the named law with one more effect, and which case, under the effect's name."""
+    odds: dict[Key, tuple[float, str]] = {}
     for i, special in enumerate(ex.data.candidates):
         if special.slug not in c.effect.contains or special.joints != c.joints:
             continue
@@ -98,7 +105,7 @@ def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[tuple[s
         for (slug, joints), value in group_odds(ex.problem, (*rest, i)).items():
             known = slug in SILENT or slug in c.effect.contains or slug == c.slug
             if joints == c.joints and not known and special.slug not in CATALOGUE[slug].contains:
-                odds[slug, joints] = max(odds.get((slug, joints), -np.inf), base + value)
+                odds[slug, joints] = max(odds.get((slug, joints), (-np.inf, "")), (base + value, special.slug))
     return odds
 
 
@@ -110,24 +117,27 @@ def _shares(odds: dict) -> dict:
 
 def _probability(ex: Explanation, index: int) -> float:
     c = ex.data.candidates[index]
-    return _shares(_rivals(ex, index))[c.slug, c.joints]
+    return _shares(_rivals(ex, index)[0])[c.slug, c.joints]
 
 
 def _alternatives(robot: Robot, ex: Explanation, index: int) -> list[dict[str, Any]]:
     c = ex.data.candidates[index]
-    best: dict[str, float] = {}
-    for (slug, joints), p in _shares(_rivals(ex, index)).items():
-        if slug and (slug, joints) != (c.slug, c.joints) and slug != c.slug and p > WORTH_SAYING:
-            best[slug] = max(best.get(slug, 0.0), p)
+    best: dict[str, tuple[float, str]] = {}
+    odds, stays = _rivals(ex, index)
+    for key, p in _shares(odds).items():
+        slug = key[0]
+        if slug and slug != c.slug and p > WORTH_SAYING:
+            best[slug] = max(best.get(slug, (0.0, "")), (p, stays.get(key, "")))
     return [
-        {"effect": slug, "probability": p, "separate_by": _separation(c.effect, CATALOGUE[slug])}
-        for slug, p in sorted(best.items(), key=lambda item: -item[1])
+        {"effect": slug, "probability": p, "separate_by": _separation(c.effect, CATALOGUE[slug], stay)}
+        for slug, (p, stay) in sorted(best.items(), key=lambda item: -item[1][0])
     ]
 
 
-def _separation(one: AbstractEffect, other: AbstractEffect) -> str:
+def _separation(one: AbstractEffect, other: AbstractEffect, stays: str) -> str:
     motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
-    return f"Record {motion}." if motion else f"Record {one.needs}; and, for {other.title}, {other.needs}."
+    motion = motion or f"{one.needs}; and, for {other.title}, {other.needs}"
+    return f"Record {motion}" + (f" ({CATALOGUE[stays].title} is there in either case)." if stays else ".")
 
 
 def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any]]:

@@ -12,6 +12,8 @@ from irb140_jax.mismatch.scout import left_over
 from irb140_jax.robot import Robot
 
 NEIGHBOURS = 12  # shapes around the named one that tell how finely its grid resolves each parameter
+SMALL = 1e-6  # of an amplitude's prior: step of a slope
+FAR = 1e5  # steps of the grid: prior standard deviation of a shape where nothing is known of it
 UNSEEN = 3.0  # a direction taken at random has six times as much of what isn't seen in one case of ten
 
 
@@ -33,9 +35,10 @@ def parameters_of(
     """
     c = ex.data.candidates[index]
     value = _physical(c, w)
+    over_shapes = np.maximum(_variance_over_shapes(ex, index, value, widen), _variance_about_shape(ex, index, w, widen))
     w, cov = _of_all_columns(ex, index, w, cov)
     physical = lambda w: np.asarray(c.effect.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
-    variance = _variance_of(physical, w, cov, value) + _variance_over_shapes(ex, index, value, widen)
+    variance = _variance_of(physical, w, cov, value) + over_shapes
     variance = variance + _variance_over_variants(ex, index, value)
     if c.effect.leans_on_inertials:
         variance = variance + (value * _inertial_doubt(ex, c)) ** 2
@@ -129,6 +132,51 @@ def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray, widen:
     spacing = np.min(np.where(steps > 1e-9 * np.abs(value), steps, np.inf), axis=0, initial=np.inf)
     spacing = np.where(np.isfinite(spacing), spacing, 0.0)
     return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + c.effect.blur(c.shape) ** 2
+
+
+def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray, widen: float) -> np.ndarray:
+    """Variance of the physical parameters about the named shape, its parameters and the amplitudes all free at once.
+
+    By the law's tangent: a grid that moves one parameter of the shape at a time does not see that a wall which leans
+    more and stands further off is felt alike.
+
+    Args:
+        ex: The explanation.
+        index: The finding.
+        w: Its amplitudes.
+        widen: As in `_variance_over_shapes`.
+    """
+    c, data = ex.data.candidates[index], ex.data
+    alike = [o for o in data.candidates if (o.slug, o.joints, o.variant) == (c.slug, c.joints, c.variant)]
+    near = _one_a_direction(alike, c.shape)
+    if not (c.effect.refines() and near):
+        return np.zeros(len(c.effect.parameters))
+    columns = np.concatenate([c.columns, *(o.columns for o in near)])
+    scale, k = data.scale[data.nuisances + columns], len(w)
+    H = ex.problem.eliminated_near(others(ex, index), columns + ex.problem.offset)[:-1, :-1]
+    # Amplitudes, and for each near shape the difference that its columns make at the amplitudes found.
+    along = np.eye(k, len(columns))
+    to = np.kron(np.eye(len(near)), w)
+    along = np.vstack([along, np.hstack([-np.tile(w, (len(near), 1)), to]) / scale])
+    prior = np.concatenate([np.ones(k), np.full(len(near), FAR**-2)])
+    cov = np.linalg.inv(along @ H @ along.T + np.diag(prior))
+    value = _physical(c, w)
+    slope = [(_physical(c, w + SMALL * step) - value) / SMALL for step in np.diag(scale[:k])]
+    slope += [_physical(o, w) - value for o in near]
+    return widen**2 * np.einsum("ip,ij,jp->p", slope, cov, slope)
+
+
+def _one_a_direction(candidates: list[Candidate], shape: np.ndarray) -> list[Candidate]:
+    """The nearest to a shape, one for each direction in which they differ from it."""
+    offsets = np.array([o.shape for o in candidates]) - shape
+    offsets = offsets / np.maximum(np.ptp(offsets, axis=0), 1e-300)
+    chosen, beyond = [], np.eye(len(shape))
+    for i in np.argsort(np.linalg.norm(offsets, axis=1)):
+        rest = beyond @ offsets[i]
+        if np.linalg.norm(rest) > 0.5 * np.linalg.norm(offsets[i]):
+            chosen.append(candidates[i])
+            beyond = beyond - np.outer(rest, rest) / (rest @ rest)
+    return chosen
 
 
 def _variance_over_variants(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:

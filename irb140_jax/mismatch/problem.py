@@ -10,7 +10,8 @@ import numpy as np
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.evidence import Layout, gain_of, gains, layouts, posterior, with_prior
 
-UNSURE = 1e-3  # of a joint's torque: what smoothing, and control in steps, may put anywhere, however exact the log
+UNSURE = 1e-3  # of a joint's torque: what smoothing and control in steps make late, however exact the log
+LEAST_SHARE = 0.005  # of its joint's torque: what has no name must matter, or it would choose among those that have one
 
 
 @dataclasses.dataclass(frozen=True)
@@ -104,6 +105,7 @@ class Problem:
         with np.errstate(invalid="ignore"):
             bad = np.any((mean < self.lowest - 1e-9) | (mean > self.highest + 1e-9), axis=1)
         bad |= np.nansum(mean * self.summed, axis=1) < self.least
+        bad |= self._silent & (self._share(mean) < LEAST_SHARE)
         return np.where(bad, -np.inf, gain + self.log_prior)
 
     def eliminated_near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
@@ -140,6 +142,14 @@ class Problem:
     def _neighbourhoods(self) -> dict[frozenset[int] | None, "Neighbourhood"]:
         return {}
 
+    @cached_property
+    def _silent(self) -> np.ndarray:
+        return np.array([c.effect.silent for c in self.candidates])
+
+    def _share(self, mean: np.ndarray) -> np.ndarray:
+        """Torque of each candidate with these amplitudes, as a share of the torque of the joint it matters most to."""
+        return np.sqrt(np.max(self._energy(mean) / self.torque_energy.sum(axis=0)[:, None], axis=0))
+
     def _energy(self, mean: np.ndarray) -> np.ndarray:
         """Squared whitened torque of each candidate with these amplitudes at each joint, shape (n, candidates)."""
         energy = np.zeros((len(self.per_joint), len(self.candidates)))
@@ -167,8 +177,7 @@ class Problem:
 
         Friction is feigned by friction: what tilts, weighs or springs does not turn with the direction of motion.  What
         acts on several joints may be feigned at each, for reversals that encoders do not see are late at all of them;
-        but no more at a joint than comes from there.  What is `UNSURE` of the torque itself may feign anything, but for
-        what comes once and goes.
+        but no more at a joint than comes from there.  What is `UNSURE` of the torque itself may feign lateness.
 
         Args:
             chosen: The set.
@@ -178,28 +187,33 @@ class Problem:
             shares = np.array([c.effect.feigned**2 for c in self.candidates])
             rubs = np.array([c.effect.friction for c in self.candidates])
             by_friction, by_all = (self.explained(chosen, friction=f)[:, None] for f in (True, False))
-            most = np.where(self.at_joint, shares * np.where(rubs, by_friction, by_all), 0.0)
+            most = np.where(self.at_joint, shares * np.where(rubs, by_friction, by_all), 0.0) + self._unsure
             self._last.clear()  # a search asks for the same set many times, and then for another
             self._last[chosen] = most, self.parts(chosen)
         most, parts = self._last[chosen]
         alone = self.at_joint.sum(axis=0) == 1
-        # What is named after one joint may be felt at others, as much as its rivals that are named after all.
-        from_there = np.maximum(odds, 0.0) * np.where(alone, self._felt, parts)
-        of_one = most + np.minimum(self._unsure, from_there)
-        return np.where(alone, of_one, np.minimum(most + self._unsure, from_there)).sum(axis=0)
+        return np.where(alone, most, np.minimum(most, np.maximum(odds, 0.0) * parts)).sum(axis=0)
 
     @cached_property
     def _unsure(self) -> np.ndarray:
-        """Half the whitened square of `UNSURE` of the torque at each joint, shape (n, candidates)."""
-        lasting = np.array([not c.effect.once for c in self.candidates])
-        return 0.5 * UNSURE**2 * self.torque_energy.sum(axis=0)[:, None] * lasting
+        """Half the whitened square of `UNSURE` of the torque at each joint of what is late, shape (n, candidates)."""
+        return 0.5 * UNSURE**2 * self.torque_energy.sum(axis=0)[:, None] * (self.at_joint & self._late)
 
     @cached_property
-    def _felt(self) -> np.ndarray:
-        """Part of each candidate's squared torque at each joint, all its amplitudes alike, shape (n, candidates)."""
+    def _late(self) -> np.ndarray:
+        """Which candidates put the log out of time, shape (len(candidates),)."""
+        return np.array([c.effect.logged > 1 for c in self.candidates])
+
+    @cached_property
+    def imitated(self) -> np.ndarray:
+        """How far up to `UNSURE` of the torque moves the amplitude of what is late, shape (len(candidates),).
+
+        In standard deviations of white noise; anything up to it is equally likely.  Of what isn't late 0.
+        """
         square = np.diagonal(self.per_joint, axis1=1, axis2=2)
         felt = np.stack([square[:, c.columns + self.offset].sum(axis=1) for c in self.candidates], axis=1)
-        return felt / np.maximum(felt.sum(axis=0), 1e-300)
+        felt = felt / np.maximum(felt.sum(axis=0), 1e-300)
+        return UNSURE * np.sqrt(self.torque_energy.sum(axis=0) @ felt / 3.0) * self._late
 
     @cached_property
     def _last(self) -> dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]]:

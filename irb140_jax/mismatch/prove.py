@@ -184,12 +184,13 @@ def _strain(ex: Explanation, chosen: tuple[int, ...]) -> float:
 
 
 def jackknife_factor(ex: Explanation) -> np.ndarray:
-    """How much wider than the posterior the estimates scatter over the data, per amplitude, never below 1.
+    """How much wider than the posterior the estimates scatter, per amplitude, never below 1.
 
     Blocks are left out in turn; scatter over recordings is the primary error bar, since it sees what white noise
     does not: laws that fit here and not there.  Of what happens once, a block that holds most of what is known says
     little of scatter when it goes: its weight is that of its share (Busing, Meijer and van der Leeden, Statistics and
-    Computing 9, 1999).
+    Computing 9, 1999).  What is out of time is known no better than the smoothing and the steps of the control, which
+    are as late in all blocks.
     """
     whole = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     blocks = len(ex.grams.recording)
@@ -202,4 +203,7 @@ def jackknife_factor(ex: Explanation) -> np.ndarray:
     weight = np.where(once & (share > MOST_OF_IT), (1.0 - share) / share, blocks - 1.0)
     centre = np.where(once, whole.mean, means.mean(axis=0))
     variance = np.sum(weight * (means - centre) ** 2, axis=0) / blocks
-    return np.sqrt(np.maximum(variance / known, 1.0))
+    imitated = ex.problem.imitated[list(ex.chosen)]
+    late = [np.full(len(m.columns), i) for m, i in zip(ex.members, imitated, strict=True)]
+    late = np.concatenate([np.zeros(ex.data.nuisances), *late])
+    return np.sqrt(np.maximum(variance / known, 1.0) + late**2)

@@ -113,7 +113,7 @@ def summary(
     undecided = [f for f in found if f["alternatives"]]
     for f in undecided:
         rivals = _listed([CATALOGUE[a["effect"]].title for a in f["alternatives"]], "or")
-        said.append(f"On {_listed(f['joints'])} the data can't rule out {rivals} instead.")
+        said.append(f"On {_listed(f['joints'])} the data can't rule out {rivals} instead of it or of a part of it.")
     said += [i["sentence"] for i in inertials if i["sentence"] and "beyond" in i["sentence"]]
     if rest and kind != "unexplained":
         said.append(f"Something without a name is left on {_listed([robot.joint_names[u.joint] for u in rest])}.")

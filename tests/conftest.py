@@ -1,0 +1,16 @@
+"""What all tests share: one folder of compiled programs, made anew for each run.
+
+Many files diagnose arms of the same few sizes; what one worker has compiled the other only reads.
+"""
+
+import atexit
+import os
+import shutil
+import tempfile
+
+if "PYTEST_XDIST_WORKER" not in os.environ and "JAX_COMPILATION_CACHE_DIR" not in os.environ:
+    folder = tempfile.mkdtemp(prefix="irb140-tests-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    # Of the workers and of the commands that the tests run, too.
+    os.environ["JAX_COMPILATION_CACHE_DIR"] = folder
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.05"
