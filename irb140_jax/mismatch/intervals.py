@@ -153,11 +153,12 @@ def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray, widen: flo
         return np.zeros(len(c.effect.parameters))
     columns = np.concatenate([c.columns, *(o.columns for o in near)])
     scale, k = data.scale[data.nuisances + columns], len(w)
+    per_scale = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)  # zero: it moves nothing
     H = ex.problem.eliminated_near(others(ex, index), columns + ex.problem.offset)[:-1, :-1]
     # Amplitudes, and for each near shape the difference that its columns make at the amplitudes found.
     along = np.eye(k, len(columns))
     to = np.kron(np.eye(len(near)), w)
-    along = np.vstack([along, np.hstack([-np.tile(w, (len(near), 1)), to]) / scale])
+    along = np.vstack([along, np.hstack([-np.tile(w, (len(near), 1)), to]) * per_scale])
     prior = np.concatenate([np.ones(k), np.full(len(near), FAR**-2)])
     cov = np.linalg.inv(along @ H @ along.T + np.diag(prior))
     value = _physical(c, w)
