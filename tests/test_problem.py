@@ -1,5 +1,7 @@
 """What imperfect laws could feign: by which laws, at which joints, over how many recordings."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from helpers_problem import ROWS, TURNS, WAVE, problem
@@ -88,3 +90,24 @@ def test_what_has_no_name_must_be_more_than_a_small_share_and_what_has_one_need_
     members = [("soft_friction", (0,), [TURNS]), ("torque_ripple", (0,), [TURNS]), ("external_wrench", (0,), [TURNS])]
     small, large = (problem(members, 1e4 * (WAVE + k * LEAST_SHARE * TURNS)[None]).scores(()) for k in (0.5, 2.0))
     assert np.isfinite(small).tolist() == [False, True, True] and np.isfinite(large).all()
+
+
+@pytest.mark.parametrize("joints", [None, {0}, {1}])
+def test_the_score_of_a_candidate_is_the_odds_of_adding_it(joints):
+    rng = np.random.default_rng(3)
+    nothing = np.zeros(ROWS)
+    torques = [[rng.normal(size=ROWS), nothing], [nothing, rng.normal(size=ROWS)], *rng.normal(size=(3, 2, ROWS))]
+    slugs = [("coulomb_friction", (0,)), ("stribeck_friction", (1,)), *[("payload", (0, 1))] * 3]
+    one_by_one = problem([(*at, X) for at, X in zip(slugs, torques, strict=True)], rng.normal(size=(2, ROWS)))
+    # The last three columns are one law of three amplitudes.
+    free = np.full((3, 3), np.inf)
+    whole = dataclasses.replace(one_by_one.candidates[2], columns=np.array([2, 3, 4]), variant=(0, 1, 2))
+    there = dataclasses.replace(
+        one_by_one, candidates=(*one_by_one.candidates[:2], whole), log_prior=np.array([-1.0, -2.0, -3.0]),
+        entry=np.zeros(3), lowest=-free, highest=free, summed=np.zeros((3, 3)), least=-free[:, 0],
+    )  # fmt: skip
+    for chosen in ((), (0,), (1,), (2,), (0, 1), (1, 2), (2, 0)):
+        scores = there.scores(chosen, joints)
+        for i in {0, 1, 2} - set(chosen):
+            near = joints is None or joints & set(there.candidates[i].joints)
+            assert scores[i] == (pytest.approx(there.odds(chosen, (i,)), rel=1e-9) if near else -np.inf)

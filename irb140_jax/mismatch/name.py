@@ -93,18 +93,7 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
 
 def conflicts(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
     """Candidates that can't stand beside the set: the effect itself, what absorbs it, what alters nothing there."""
-    taken: dict[tuple[int, ...], set[str]] = defaultdict(set)
-    absorbed: dict[tuple[int, ...], set[str]] = defaultdict(set)
-    means: dict[tuple[int, ...], set[str]] = defaultdict(set)
-    for c in (problem.candidates[i] for i in chosen):
-        taken[c.joints].add(c.slug)
-        absorbed[c.joints] |= _absorbed(c)
-        means[c.joints] |= {c.slug, *c.effect.contains}
-    return np.array([
-        c.slug in taken[c.joints] | absorbed[c.joints] or bool(_absorbed(c) & taken[c.joints])
-        or (c.effect.alters is not None and c.effect.alters not in means[c.joints])
-        for c in problem.candidates
-    ])  # fmt: skip
+    return problem.beside.conflicts(chosen)
 
 
 def possible_beside(problem: Problem, chosen: tuple[int, ...], options: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
@@ -113,10 +102,6 @@ def possible_beside(problem: Problem, chosen: tuple[int, ...], options: list[tup
         return []
     bad = conflicts(problem, chosen)
     return [o for o in options if not bad[list(o)].any()]
-
-
-def _absorbed(c: Candidate) -> set[str]:
-    return set(c.effect.contains) if c.effect.absorbs else set()
 
 
 def _settled(
@@ -159,7 +144,7 @@ def _exchange(
         if len(drop) == 1 and not old[0].effect.friction:
             # What goes feigns nothing any more, and had to take such a hurdle itself.
             lower = np.maximum(problem.feigned(rest, own) - problem.feigned(rest, already)[drop[0]], 0.0)
-            hurdle = np.where([c.effect.friction for c in problem.candidates], hurdle, lower)
+            hurdle = np.where(problem.friction, hurdle, lower)
         for i in np.flatnonzero(scores > best):
             c = problem.candidates[i]
             if len(drop) == 1 and c.slug in old[0].effect.contains:

@@ -7,20 +7,32 @@ from functools import cached_property
 
 import numpy as np
 
+from irb140_jax.mismatch.beside import Beside
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.evidence import Layout, gain_of, gains, layouts, posterior, with_prior
+from irb140_jax.mismatch.evidence import Layout, gain_of, gains, half_of, posterior
 
 UNSURE = 1e-3  # of a joint's torque: what smoothing and control in steps make late, however exact the log
+REMEMBERED = 512  # scores: what puts in, exchanges, simplifies and removes asks for the same ones in turn
 LEAST_SHARE = 0.005  # of its joint's torque: what has no name must matter, or it would choose among those that have one
 
 
 @dataclasses.dataclass(frozen=True)
 class Neighbourhood:
-    """Candidates near some joints: which, their columns in the Gram matrix, and groups numbered within those."""
+    """Some candidates: which, their columns in the Gram matrix, and groups numbered within those.
+
+    Attributes:
+        which: Candidates.
+        columns: Their columns.
+        groups: Candidates with equally many columns, numbered among these.
+        gram: Gram matrix of these columns and y.
+        own: Gram matrices of each candidate's own columns at each joint, per group, shape (n, members, k, k).
+    """
 
     which: np.ndarray
     columns: np.ndarray
     groups: tuple[Layout, ...]
+    gram: np.ndarray
+    own: list[np.ndarray]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,9 +70,9 @@ class Problem:
         return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
 
     @cached_property
-    def groups(self) -> tuple[Layout, ...]:
-        """All candidates, in groups of equal size."""
-        return layouts(self.candidates, self.offset)
+    def beside(self) -> Beside:
+        """Which candidates can't stand beside each other."""
+        return Beside(self.candidates)
 
     @cached_property
     def motions(self) -> np.ndarray:
@@ -75,8 +87,7 @@ class Problem:
         """
         near, parts = self._on_several, self.at_joint.astype(float)
         if len(near.which):
-            H = self.eliminated_near(chosen, near.columns)
-            energy = self._energy(gains(H, near.groups, len(self.candidates), self.lowest.shape[1])[1])[:, near.which]
+            energy = self._energy(near, self._gains(near, chosen)[1])[:, near.which]
             parts[:, near.which] = energy / np.maximum(energy.sum(axis=0), 1e-300)
         return parts
 
@@ -99,14 +110,33 @@ class Problem:
             chosen: The set.
             joints: Only candidates that touch these joints, -inf for the rest; all by default.
         """
-        near = self.neighbourhood(frozenset(joints) if joints is not None else None)
-        H = self.eliminated_near(chosen, near.columns)
-        gain, mean = gains(H, near.groups, len(self.candidates), self.lowest.shape[1])
+        key = chosen, frozenset(joints) if joints is not None else None
+        if key not in self._scores:
+            if len(self._scores) >= REMEMBERED:
+                self._scores.pop(next(iter(self._scores)))
+            self._scores[key] = self._scored(chosen, self.neighbourhood(key[1]))
+            self._scores[key].setflags(write=False)
+        return self._scores[key]
+
+    @cached_property
+    def _scores(self) -> dict[tuple[tuple[int, ...], frozenset[int] | None], np.ndarray]:
+        return {}
+
+    def _scored(self, chosen: tuple[int, ...], near: "Neighbourhood") -> np.ndarray:
+        gain, mean = self._gains(near, chosen)
         with np.errstate(invalid="ignore"):
             bad = np.any((mean < self.lowest - 1e-9) | (mean > self.highest + 1e-9), axis=1)
         bad |= np.nansum(mean * self.summed, axis=1) < self.least
-        bad |= self._silent & (self._share(mean) < LEAST_SHARE)
+        # Silent ones: the most that their torque is of a joint's.
+        share = np.max(self._energy(self._silent, mean) / self.torque_energy.sum(axis=0)[:, None], axis=0)
+        bad[self._silent.which] |= share[self._silent.which] < LEAST_SHARE**2
         return np.where(bad, -np.inf, gain + self.log_prior)
+
+    def _gains(self, near: "Neighbourhood", chosen: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Log evidence and amplitudes of some candidates beside a set, as by `evidence.gains`."""
+        index, c = np.append(near.columns, self.H.shape[0] - 1), self.columns(chosen)
+        half = half_of(self.H, c, index) if len(c) else None
+        return gains(near.gram, near.groups, len(self.candidates), self.lowest.shape[1], half)
 
     def eliminated_near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
         """Gram matrix of some columns and y, with a set eliminated."""
@@ -115,7 +145,7 @@ class Problem:
         c = self.columns(chosen)
         if len(c) == 0:
             return H
-        half = np.linalg.solve(np.linalg.cholesky(with_prior(self.H[np.ix_(c, c)])), self.H[np.ix_(c, index)])
+        half = half_of(self.H, c, index)
         return H - half.T @ half
 
     def neighbourhood(self, joints: frozenset[int] | None) -> "Neighbourhood":
@@ -136,32 +166,27 @@ class Problem:
             groups[len(self.candidates[i].columns)].append(int(i))
         local = lambda i: [number[int(c)] for c in self.candidates[i].columns]  # noqa: E731
         layout = tuple(Layout(np.array(m), np.array([local(i) for i in m])) for m in groups.values())
-        return Neighbourhood(which, columns + self.offset, layout)
+        columns = columns + self.offset
+        index = np.append(columns, self.H.shape[0] - 1)
+        at = [columns[g.columns] for g in layout]
+        own = [self.per_joint[:, i[:, :, None], i[:, None, :]] for i in at]
+        return Neighbourhood(which, columns, layout, self.H[np.ix_(index, index)], own)
 
     @cached_property
     def _neighbourhoods(self) -> dict[frozenset[int] | None, "Neighbourhood"]:
         return {}
 
     @cached_property
-    def _silent(self) -> np.ndarray:
-        return np.array([c.effect.silent for c in self.candidates])
+    def _silent(self) -> "Neighbourhood":
+        return self._numbered(np.flatnonzero([c.effect.silent for c in self.candidates]))
 
-    def _share(self, mean: np.ndarray) -> np.ndarray:
-        """Torque of each candidate with these amplitudes, as a share of the torque of the joint it matters most to."""
-        return np.sqrt(np.max(self._energy(mean) / self.torque_energy.sum(axis=0)[:, None], axis=0))
-
-    def _energy(self, mean: np.ndarray) -> np.ndarray:
-        """Squared whitened torque of each candidate with these amplitudes at each joint, shape (n, candidates)."""
+    def _energy(self, near: "Neighbourhood", mean: np.ndarray) -> np.ndarray:
+        """Squared whitened torque of candidates with these amplitudes at each joint, shape (n, candidates)."""
         energy = np.zeros((len(self.per_joint), len(self.candidates)))
-        for g, G in zip(self.groups, self._own_grams, strict=True):
+        for g, G in zip(near.groups, near.own, strict=True):
             v = np.nan_to_num(mean[g.which, : g.columns.shape[1]])
             energy[:, g.which] = np.einsum("ik,jikl,il->ji", v, G, v)
         return energy
-
-    @cached_property
-    def _own_grams(self) -> list[np.ndarray]:
-        """Gram matrix of each candidate's own columns at each joint, per group, shape (n, members, k, k)."""
-        return [self.per_joint[:, g.columns[:, :, None], g.columns[:, None, :]] for g in self.groups]
 
     def odds(self, rest: tuple[int, ...], chosen: Iterable[int]) -> float:
         """Log posterior odds of adding some candidates to a set."""
@@ -185,9 +210,8 @@ class Problem:
         """
         if chosen not in self._last:
             shares = np.array([c.effect.feigned**2 for c in self.candidates])
-            rubs = np.array([c.effect.friction for c in self.candidates])
             by_friction, by_all = (self.explained(chosen, friction=f)[:, None] for f in (True, False))
-            most = np.where(self.at_joint, shares * np.where(rubs, by_friction, by_all), 0.0) + self._unsure
+            most = np.where(self.at_joint, shares * np.where(self.friction, by_friction, by_all), 0.0) + self._unsure
             self._last.clear()  # a search asks for the same set many times, and then for another
             self._last[chosen] = most, self.parts(chosen)
         most, parts = self._last[chosen]
@@ -198,6 +222,11 @@ class Problem:
     def _unsure(self) -> np.ndarray:
         """Half the whitened square of `UNSURE` of the torque at each joint of what is late, shape (n, candidates)."""
         return 0.5 * UNSURE**2 * self.torque_energy.sum(axis=0)[:, None] * (self.at_joint & self._late)
+
+    @cached_property
+    def friction(self) -> np.ndarray:
+        """Which candidates are laws of friction, shape (len(candidates),)."""
+        return np.array([c.effect.friction for c in self.candidates], dtype=bool)
 
     @cached_property
     def _late(self) -> np.ndarray:
