@@ -10,7 +10,7 @@ from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.intervals import others, parameters_of
 from irb140_jax.mismatch.name import PREFER
-from irb140_jax.mismatch.problem import group_odds
+from irb140_jax.mismatch.problem import best_of_groups
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.robot import Robot
@@ -64,28 +64,40 @@ def _rivals(ex: Explanation, index: int) -> tuple[dict[Key, float], dict[Key, st
     c = ex.data.candidates[index]
     rest = others(ex, index)
     taken = {(ex.data.candidates[i].slug, ex.data.candidates[i].joints) for i in rest}
-    odds = {
+    best = {
         key: value
-        for key, value in group_odds(ex.problem, rest).items()
+        for key, value in best_of_groups(ex.problem, rest).items()
         if set(key[1]) & set(c.joints) and key[0] not in SILENT and key not in taken
     }
+    odds = {key: value for key, (value, _) in best.items()}
     own = odds[c.slug, c.joints]
     joints = list(c.joints)
-    explained = {rubs: ex.problem.explained(ex.chosen, friction=rubs)[joints] for rubs in (True, False)}
     # Of what acts on several joints no more is feigned at one of them than comes from there.
     there = max(own, 0.0) * ex.problem.parts(rest)[joints, index] if len(joints) > 1 else np.inf
+
+    def feigned(rival: AbstractEffect, chosen: tuple[int, ...]) -> float:
+        """What imperfect laws of a set could feign of the odds of a rival, or of those against it."""
+        if not rival.feigned:
+            return 0.0
+        explained = ex.problem.explained(chosen, friction=rival.friction)[joints]
+        return float(np.sum(np.minimum(rival.feigned**2 * explained, there)))
+
     for key, value in odds.items():
         if key == (c.slug, c.joints) or key[0] in c.effect.contains:
             continue  # a special case has already lost by more than what an imperfect law could feign
         rival = CATALOGUE[key[0]]
-        excess, guard = value - own, float(np.sum(np.minimum(rival.feigned**2 * explained[rival.friction], there)))
+        excess = value - own
         if c.slug in rival.contains:
+            guard = feigned(rival, ex.chosen)
             # A law that contains the named one was not needed; even odds where the search would have taken it.  Below,
             # as much of its handicap counts as imperfect laws have a part in the hurdle: on clean data, the evidence.
             hurdle = guard + PREFER
             odds[key] = own + min(excess, 0.0) - PREFER * guard / hurdle * (1.0 - max(excess, 0.0) / hurdle)
-        elif abs(excess) <= guard:
-            odds[key] = own  # within what an imperfect law could feign, a rival is as good as the named law
+        elif np.isfinite(value) and -excess <= feigned(rival, (*rest, best[key][1])):
+            # Within what imperfect laws could feign, a rival is as good as the named law: of the laws that there would
+            # be in its place.  A torque constant that the inertials absorb but for a hundredth explains far more than
+            # what tells it from others.
+            odds[key] = own
     stays: dict[Key, str] = {}
     for key, (value, special) in _pairs(ex, rest, c).items():
         if min(value, own) > odds.get(key, -np.inf):
@@ -102,7 +114,7 @@ def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[Key, tu
         if special.slug not in c.effect.contains or special.joints != c.joints:
             continue
         base = ex.problem.odds(rest, (i,))
-        for (slug, joints), value in group_odds(ex.problem, (*rest, i)).items():
+        for (slug, joints), (value, _) in best_of_groups(ex.problem, (*rest, i)).items():
             known = slug in SILENT or slug in c.effect.contains or slug == c.slug
             if joints == c.joints and not known and special.slug not in CATALOGUE[slug].contains:
                 odds[slug, joints] = max(odds.get((slug, joints), (-np.inf, "")), (base + value, special.slug))

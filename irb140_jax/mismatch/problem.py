@@ -266,10 +266,11 @@ class Problem:
         return 0.5 * explained / (self.motions if friction else 1.0)
 
 
-def group_odds(problem: Problem, chosen: tuple[int, ...]) -> dict[tuple[str, tuple[int, ...]], float]:
-    """Best log odds of adding each effect at each site to a set, over its shapes and variants."""
-    odds: dict[tuple[str, tuple[int, ...]], float] = {}
-    for score, c in zip(problem.scores(chosen), problem.candidates, strict=True):
+def best_of_groups(problem: Problem, chosen: tuple[int, ...]) -> dict[tuple[str, tuple[int, ...]], tuple[float, int]]:
+    """Best log odds of adding each effect at each site to a set, over shapes and variants, and which one has them."""
+    best: dict[tuple[str, tuple[int, ...]], tuple[float, int]] = {}
+    for i, (score, c) in enumerate(zip(problem.scores(chosen).tolist(), problem.candidates, strict=True)):
         key = (c.slug, c.joints)
-        odds[key] = max(odds.get(key, -np.inf), float(score))
-    return odds
+        if key not in best or score > best[key][0]:
+            best[key] = score, i
+    return best
