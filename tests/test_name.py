@@ -75,9 +75,3 @@ def test_rules_that_undo_each_other_end_at_once(monkeypatch):
     monkeypatch.setattr(name, "_exchange", swaps)
     assert name._settled(problem([SPRING, GAIN], WAVE[None]), (0,)) == (0,)
     assert len(asked) == 2
-
-
-@pytest.mark.parametrize("faint, left", [(0.05, (0,)), (1.0, (0, 1))])
-def test_what_has_not_the_odds_of_a_finding_is_not_needed(faint, left):
-    there = problem([SPRING, ("rotor_inertia", (0,), [TURNS])], (3.0 * WAVE + faint * TURNS)[None])
-    assert name.needed(there, (0, 1)) == left

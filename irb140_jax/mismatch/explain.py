@@ -11,7 +11,7 @@ from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble, first_noise, pr
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
 from irb140_jax.mismatch.model import Named, better_known, composed
-from irb140_jax.mismatch.name import guessed, needed, search
+from irb140_jax.mismatch.name import guessed, search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.problem import Problem
@@ -136,15 +136,11 @@ def _settled(
 
 
 def withdrawn(ex: Explanation, names: Collection[int]) -> Explanation:
-    """The explanation without some candidates, and without what is not worth a name in the noise that is left then."""
-    chosen, fewer = ex.chosen, tuple(c for c in ex.chosen if c not in names)
-    while fewer != chosen:
-        chosen = fewer
-        noise = _noise_under(ex.data, ex.problem, ex.grams, chosen)
-        prob, g = problem(ex.data, noise)
-        ex = dataclasses.replace(ex, noise=noise, problem=prob, grams=g, chosen=chosen)
-        fewer = needed(prob, chosen)
-    return ex
+    """The explanation without some candidates, weighted by the noise that it then leaves."""
+    chosen = tuple(c for c in ex.chosen if c not in names)
+    noise = _noise_under(ex.data, ex.problem, ex.grams, chosen)
+    prob, g = problem(ex.data, noise)
+    return dataclasses.replace(ex, noise=noise, problem=prob, grams=g, chosen=chosen)
 
 
 def full_posterior(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without=None) -> Posterior:

@@ -33,13 +33,6 @@ def guessed(problem: Problem, start: tuple[int, ...] = ()) -> tuple[int, ...]:
     return _settled(problem, _grown(problem, start))
 
 
-def needed(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
-    """What is left of a set when those go that have not the odds a finding needs, the least needed first."""
-    while (fewer := _remove(problem, chosen, chosen)) is not None:
-        chosen = fewer
-    return chosen
-
-
 def _split(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
     """Put several effects in the place of one that acts on several joints at once, where they explain more."""
     for d in chosen:
