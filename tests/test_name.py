@@ -48,7 +48,7 @@ def test_physics_takes_the_place_of_soft_friction_at_even_odds():
 
 def test_soft_friction_stands_beside_dry_friction_or_not_at_all():
     there = problem([FRICTION, ("soft_friction", (0,), [WAVE]), ("stribeck_friction", (0,), [NEAR])], WAVE[None])
-    assert [bool(name.conflicts(there, chosen)[1]) for chosen in ((), (0,), (2,))] == [True, False, False]
+    assert [bool(there.beside.conflicts(chosen)[1]) for chosen in ((), (0,), (2,))] == [True, False, False]
 
 
 @pytest.mark.parametrize("bend, left", [(0.02, {0, 2}), (1.0, {0, 1})])

@@ -99,15 +99,15 @@ def test_right_inertials_are_not_called_wrong(pendulum, design):
     assert not any("wrong beyond" in link["sentence"] for link in pendulum[f"{design} correct"]["inertials"])
 
 
-def test_friction_that_grows_with_load_is_named_on_the_servo_and_no_stribeck_law(servo):
+def test_friction_that_grows_with_load_and_with_speed_is_named_on_the_servo_and_no_stribeck_law(servo):
     named = _named(servo)
-    assert ("load_dependent_friction", ("servo",)) in named
+    assert {("load_dependent_friction", ("servo",)), ("viscous_friction", ("servo",))} <= named
     assert not {"stribeck_friction", "payload"} & {effect for effect, _ in named}
 
 
 def test_the_corrected_servo_errs_less_on_unseen_data_than_one_with_refitted_inertials(servo):
     fit = servo["fit"]["servo"]
-    assert fit["rmse_corrected"] < 0.8 * fit["rmse_refit"]  # Coulomb and viscous friction alone: 0.9
+    assert fit["rmse_corrected"] < 0.7 * fit["rmse_refit"]  # Coulomb and viscous friction alone: 0.9
 
 
 def test_the_simulated_servo_stops_where_friction_holds_the_pendulum():

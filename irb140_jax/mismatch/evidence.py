@@ -161,7 +161,16 @@ def layouts(candidates: Sequence[Candidate], offset: int) -> tuple[Layout, ...]:
 
 
 def half_of(H: np.ndarray, columns: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """What marginalising some columns (unit prior) takes off others, `half.T @ half`; shape (columns, index)."""
+    """What marginalising some columns takes off others, as `half.T @ half`.
+
+    Args:
+        H: Gram matrix of whitened columns in prior units, without units themselves, shape (K, K).
+        columns: Which to marginalise, each with a standard normal prior.
+        index: The others that are asked for.
+
+    Returns:
+        The half, shape (len(columns), len(index)).
+    """
     chol = np.linalg.cholesky(with_prior(H[np.ix_(columns, columns)]))
     return linalg.solve_triangular(chol, H[np.ix_(columns, index)], lower=True, check_finite=False)
 

@@ -69,42 +69,55 @@ def _rivals(ex: Explanation, index: int) -> tuple[dict[Key, float], dict[Key, st
         for key, value in best_of_groups(ex.problem, rest).items()
         if set(key[1]) & set(c.joints) and key[0] not in SILENT and key not in taken
     }
-    odds = {key: value for key, (value, _) in best.items()}
-    own = odds[c.slug, c.joints]
-    joints = list(c.joints)
+    own, joints = best[c.slug, c.joints][0], list(c.joints)
     # Of what acts on several joints no more is feigned at one of them than comes from there.
     there = max(own, 0.0) * ex.problem.parts(rest)[joints, index] if len(joints) > 1 else np.inf
-
-    def feigned(rival: AbstractEffect, chosen: tuple[int, ...]) -> float:
-        """What imperfect laws of a set could feign of the odds of a rival, or of those against it."""
-        if not rival.feigned:
-            return 0.0
-        explained = ex.problem.explained(chosen, friction=rival.friction)[joints]
-        return float(np.sum(np.minimum(rival.feigned**2 * explained, there)))
-
-    for key, value in odds.items():
-        if key == (c.slug, c.joints) or key[0] in c.effect.contains:
-            continue  # a special case has already lost by more than what an imperfect law could feign
-        rival = CATALOGUE[key[0]]
-        excess = value - own
-        if c.slug in rival.contains:
-            guard = feigned(rival, ex.chosen)
-            # A law that contains the named one was not needed; even odds where the search would have taken it.  Below,
-            # as much of its handicap counts as imperfect laws have a part in the hurdle: on clean data, the evidence.
-            hurdle = guard + PREFER
-            odds[key] = own + min(excess, 0.0) - PREFER * guard / hurdle * (1.0 - max(excess, 0.0) / hurdle)
-        elif np.isfinite(value) and -excess <= feigned(rival, (*rest, best[key][1])):
-            # Within what imperfect laws could feign, a rival is as good as the named law: of the laws that there would
-            # be in its place.  A torque constant that the inertials absorb but for a hundredth explains far more than
-            # what tells it from others.
-            odds[key] = own
+    mine = (c.slug, c.joints)
+    odds = {key: _fair(ex, index, CATALOGUE[key[0]], value, own, there) for key, value in best.items() if key != mine}
+    odds[mine] = own
     stays: dict[Key, str] = {}
     for key, (value, special) in _pairs(ex, rest, c).items():
         if min(value, own) > odds.get(key, -np.inf):
             odds[key], stays[key] = min(value, own), special
     odds["", ()] = 0.0
     # What the search preferred by its own rules is at least as probable as what it did not take.
-    return {key: value if key == (c.slug, c.joints) else min(value, own) for key, value in odds.items()}, stays
+    return {key: value if key == mine else min(value, own) for key, value in odds.items()}, stays
+
+
+def _fair(
+    ex: Explanation, index: int, rival: AbstractEffect, best: tuple[float, int], own: float, most: float | np.ndarray
+) -> float:
+    """Log odds of a rival in a finding's place, what imperfect laws could feign of the difference left out of account.
+
+    Args:
+        ex: The explanation.
+        index: The finding.
+        rival: The effect in its place.
+        best: The rival's log odds, and the candidate that has them.
+        own: The finding's.
+        most: Log odds that can be feigned at each of its joints.
+    """
+    c, value, excess = ex.data.candidates[index], best[0], best[0] - own
+
+    def feigned(chosen: tuple[int, ...]) -> float:
+        """What imperfect laws of a set could feign of the odds of the rival, or of those against it."""
+        if not rival.feigned:
+            return 0.0
+        explained = ex.problem.explained(chosen, friction=rival.friction)[list(c.joints)]
+        return float(np.sum(np.minimum(rival.feigned**2 * explained, most)))
+
+    if rival.slug in c.effect.contains:
+        return value  # a special case has already lost by more than what an imperfect law could feign
+    if c.slug in rival.contains:
+        # A law that contains the named one was not needed; even odds where the search would have taken it.  Below, as
+        # much of its handicap counts as imperfect laws have a part in the hurdle: on clean data, the evidence.
+        guard = feigned(ex.chosen)
+        hurdle = guard + PREFER
+        return own + min(excess, 0.0) - PREFER * guard / hurdle * (1.0 - max(excess, 0.0) / hurdle)
+    # Within what imperfect laws could feign, a rival is as good as the named law: of the laws that there would be in
+    # its place.  A torque constant that the inertials absorb but for a hundredth explains far more than what tells it
+    # from others.
+    return own if np.isfinite(value) and -excess <= feigned((*others(ex, index), best[1])) else value
 
 
 def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[Key, tuple[float, str]]:

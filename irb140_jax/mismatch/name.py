@@ -62,7 +62,7 @@ def _joined(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
         if len(alike) < 2:
             continue
         rest = tuple(c for c in chosen if c not in alike)
-        scores = np.where(everywhere & ~conflicts(problem, rest), problem.scores(rest), -np.inf)
+        scores = np.where(everywhere & ~problem.beside.conflicts(rest), problem.scores(rest), -np.inf)
         best = int(np.argmax(scores))
         if scores[best] - ACCEPT > problem.odds(rest, alike) - len(alike) * ACCEPT:
             return _settled(problem, (*rest, best))
@@ -76,7 +76,7 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
         scores = problem.scores(chosen) + problem.entry
         scores = scores - problem.feigned(chosen, scores) - ACCEPT
         scores[[*chosen, *banned]] = -np.inf
-        scores = np.where(conflicts(problem, chosen), -np.inf, scores)
+        scores = np.where(problem.beside.conflicts(chosen), -np.inf, scores)
         best = int(np.argmax(scores))
         if scores[best] <= 0:
             break
@@ -91,16 +91,11 @@ def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = f
     return chosen
 
 
-def conflicts(problem: Problem, chosen: tuple[int, ...]) -> np.ndarray:
-    """Candidates that can't stand beside the set: the effect itself, what absorbs it, what alters nothing there."""
-    return problem.beside.conflicts(chosen)
-
-
 def possible_beside(problem: Problem, chosen: tuple[int, ...], options: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
     """Those of some sets that can stand beside another."""
     if not options:
         return []
-    bad = conflicts(problem, chosen)
+    bad = problem.beside.conflicts(chosen)
     return [o for o in options if not bad[list(o)].any()]
 
 
@@ -136,7 +131,7 @@ def _exchange(
         old = [problem.candidates[c] for c in drop]
         own, already = problem.scores(rest, {j for c in old for j in c.joints}), problem.odds(rest, drop)
         scores = own - already
-        scores[conflicts(problem, rest)] = -np.inf
+        scores[problem.beside.conflicts(rest)] = -np.inf
         scores[[*drop, *banned]] = -np.inf
         if not (scores > best).any():
             continue

@@ -258,7 +258,9 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
     """Findings that only stand in for the structure, smallest first, each on top of those before.
 
     Its variables predict as well without them; or they are rarer laws that leave more than they name, or so much in
-    their own variables that the form must be another.
+    their own variables that the form must be another.  Dry and viscous friction come together: where another law of
+    friction is named at the joint, ordinary friction is there, and in doubt only if it makes the structure harder to
+    predict.
     """
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     w, at, torques = post.mean * ex.data.scale[post.columns], ex.data.nuisances, {}
@@ -277,8 +279,12 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
         ratio = size / np.sqrt(np.mean(torques[index] ** 2))
         error = _missed(carrier, without[:, None])[0] / _missed(carrier, y[:, None])[0]
         form = ratio > 1.0 or _scores(carrier, own[:, None])[0] > SAME
-        form = form and not ex.data.candidates[index].effect.ordinary
-        if error < BETTER or (ratio > BELITTLED and (form or error < 1.0 + NO_WORSE * min(ratio, 1.0))):
+        law = ex.data.candidates[index].effect
+        sure = law.ordinary and any(ex.data.candidates[i].effect.friction for i in torques if i != index)
+        form = form and not law.ordinary
+        if error < BETTER or (
+            not sure and ratio > BELITTLED and (form or error < 1.0 + NO_WORSE * min(ratio, 1.0))
+        ):
             out.append(index)
             y = without
     return tuple(out)
