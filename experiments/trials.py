@@ -156,6 +156,8 @@ def judged(kind: Kind, seed: int) -> dict:
         "not_testable": d["not_testable"], **unseen_errors(result.model, case, noise), "seconds": seconds,
     }  # fmt: skip
     told = {e["effect"] for e in case.truth["effects"]} & set(CATALOGUE)
+    # Beside them their special cases: an oracle without them would call dry friction asymmetric whatever the data say.
+    told |= {special for slug in told for special in CATALOGUE[slug].contains}
     if told and (kind == "single" or trials_report.missed(record)):
         oracle = diagnose(robot, recordings, DiagnoseConfig(effects=tuple(CATALOGUE[s] for s in told))).diagnosis
         record["oracle"] = {"fit": oracle["fit"], "found": oracle["findings"]}

@@ -315,7 +315,8 @@ def write(out: pathlib.Path) -> None:
         "inertials 5 % wrong; three recordings of 15 s; the IRB 140 and random robots of 1 to 7 joints with slides.",
         "Strength is the effect's torque RMS as a share of its joint's: plain 20 %, masked 6 %, buried 2 %. A rough",
         "log has encoders of 17 bits, 2 % coloured torque noise with spikes, jittered stamps and lost samples.",
-        "Every miss is listed, with what a search finds that is told which effects are hidden, and looks for no other.",
+        "Every miss is listed, with what a search finds that is told which effects are hidden, and looks for no others",
+        "but their special cases.",
         "Cases are kept as the code goes on: delete a result file to make its cases anew.",
     ]
     for kind, title in TITLES.items():
