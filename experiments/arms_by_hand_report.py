@@ -67,7 +67,8 @@ def table(cases: list[dict], ordinary: tuple[str, ...] = (), *, by_law: bool = F
     parts = dict.fromkeys(map(what, cases)) if by_law else ARMS
     apart = ["ordinary friction", "named"] if ordinary else []
     first = ["hidden" if by_law else "arm", "cases", "exact, nothing added", "hidden", "named"]
-    heads = [*first, "listed as not testable", *apart, "findings not there"]
+    last = ["findings not there", "median error", "90 % intervals that cover"]
+    heads = [*first, "listed as not testable", *apart, *last]
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for name, part in [*((p, [c for c in cases if what(c) == p]) for p in parts), ("all", cases)]:
         laws = [(c, e) for c in part for e in c["truth"]]
@@ -76,19 +77,12 @@ def table(cases: list[dict], ordinary: tuple[str, ...] = (), *, by_law: bool = F
         listed = sum(e["effect"] in {x["effect"] for x in c["not_testable"]} for c, e in missed)
         row = [len(part), sum(c["exact"] for c in part), count(laws, False), count(laws, False) - count(missed, False)]
         row += [listed, *((count(laws, True), count(laws, True) - count(missed, True)) if ordinary else ())]
-        row += [sum(len(without(c["found"], c["truth"])) for c in part)]
+        row += [sum(len(without(c["found"], c["truth"])) for c in part), *_errors(_values(part, ordinary))]
         lines.append(f"| {name} | {' | '.join(map(str, row))} |")
-    values = []
-    for c in cases:
-        found = {key(f): f["parameters"] for f in c["found"]}
-        for e in c["truth"]:
-            own = found.get(key(e), {})
-            values += [(own[k]["value"], own[k]["std"], v) for k, v in e["parameters"].items() if k in own and v]
+    error, cover = _errors(_values(cases))
     figures = "No parameter to compare: nothing that was hidden is named."
-    if values:
-        error = 100 * np.median([abs(v / true - 1.0) for v, _, true in values])
-        cover = 100 * np.mean([abs(v - true) <= 1.645 * std for v, std, true in values])
-        figures = f"Median error of the parameters of what is named: {error:.2g} %; {cover:.0f} % of their 90 % "
+    if error:
+        figures = f"Median error of the parameters of what is named, all laws: {error}; {cover} of their 90 % "
         figures += "intervals cover the truth."
     nothing = [c for c in cases if all(e["effect"] in ordinary for e in c["truth"])]
     false = sum(len(without(c["found"], c["truth"])) for c in nothing)
@@ -112,6 +106,26 @@ def table(cases: list[dict], ordinary: tuple[str, ...] = (), *, by_law: bool = F
         ),
         "",
     ]
+
+
+def _values(cases: list[dict], but: tuple[str, ...] = ()) -> list[tuple[float, float, float]]:
+    """Value, standard deviation and truth of every parameter of what is named, but for some laws."""
+    out = []
+    for c in cases:
+        found = {key(f): f["parameters"] for f in c["found"]}
+        for e in (e for e in c["truth"] if e["effect"] not in but):
+            own = found.get(key(e), {})
+            out += [(own[k]["value"], own[k]["std"], v) for k, v in e["parameters"].items() if k in own and v]
+    return out
+
+
+def _errors(values: list[tuple[float, float, float]]) -> tuple[str, str]:
+    """Median relative error, and share of the 90 % intervals that cover the truth, in words; empty without values."""
+    if not values:
+        return "", ""
+    error = 100 * np.median([abs(v / true - 1.0) for v, _, true in values])
+    cover = 100 * np.mean([abs(v - true) <= 1.645 * std for v, std, true in values])
+    return f"{error:.2g} %", f"{cover:.0f} %"
 
 
 def read(path: pathlib.Path) -> list[dict]:

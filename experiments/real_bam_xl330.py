@@ -96,7 +96,7 @@ COULOMB_AND_VISCOUS = ("gain", "rotor", "viscous", "brake", "coulomb")
 NAMED = {"load": "load_coefficient", "coulomb": "coulomb"}  # numbers of the servo as the diagnosis calls them
 DOUBTED = ("load_coefficient", "viscous", "inertia")
 WITHIN = 3.0  # standard deviations of the diagnosis
-COPIES = 16  # servos with scattered numbers, over which an error is expected: eight and their mirror images
+COPIES = 64  # servos with scattered numbers, over which an error is expected: half of them mirror images
 LEAST = 1e-4  # of a number that may be nothing: searches go over logarithms
 Bounds = dict[str, tuple[float, float]]
 
@@ -199,7 +199,7 @@ def doubt(findings: list[dict]) -> float:
 
 def compared(free: Sequence[str], runs: dict[str, tuple[int, Recording]], config: Config) -> list[dict[str, float]]:
     """By scatter: error on a gain that the refit did not see, mean over the gains but the judged one; and on that."""
-    gains = sorted({kp for kp, _ in runs.values()} - {JUDGED})
+    gains, config = sorted({kp for kp, _ in runs.values()} - {JUDGED}), dataclasses.replace(config, starts=2)
     out = []
     for scatter in config.scatters:
         errors = {}
