@@ -10,7 +10,7 @@ from scipy import signal, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.evidence import eliminated, gain_of, gains, grams, layouts, posterior
+from irb140_jax.mismatch.evidence import Layout, eliminated, gain_of, gains, grams, layouts, posterior
 from irb140_jax.mismatch.noise import ORDER, Noise, noise_from_residuals
 from irb140_jax.mismatch.rows import Stretch
 
@@ -276,3 +276,17 @@ def test_noise_of_few_rows_between_many_gaps_is_of_the_size_of_the_residual():
         noise = noise_from_residuals([x], [use], np.zeros(1))
         size = np.sqrt(np.mean(x[use] ** 2))
         assert 0.5 * size < noise.level[0, 0] < 10.0 * size
+
+
+def test_columns_that_others_explain_to_the_last_digits_are_no_evidence_and_stop_nothing():
+    rng = np.random.default_rng(1)
+    nuisances = 1e8 * rng.normal(size=(200, 4))
+    columns = nuisances @ rng.normal(size=(4, 6))
+    rows = np.hstack([nuisances, columns, rng.normal(size=(200, 1))])
+    H, _ = eliminated(rows.T @ rows, np.arange(4))
+    H = H[4:, 4:]
+    for k in (1, 2):
+        which = np.arange(6 // k)
+        gain, _ = gains(H, [Layout(which, np.arange(6).reshape(-1, k))], len(which), k)
+        assert not np.isnan(gain).any() and (gain < 1.0).all()
+    assert np.abs(posterior(H, np.arange(6)).mean).max() < 1.0

@@ -94,8 +94,8 @@ def _grams_of_joint(
 
 
 def with_prior(G: np.ndarray) -> np.ndarray:
-    """Gram matrix of amplitudes with their unit prior; far beyond it, what rounding leaves of a singular matrix."""
-    return G + np.diag(1.0 + ROUNDING * np.diag(G))
+    """Gram matrices (..., k, k) of amplitudes with their unit prior; far beyond it, what rounding leaves of them."""
+    return G + np.eye(G.shape[-1]) * (1.0 + ROUNDING * np.diagonal(G, axis1=-2, axis2=-1))[..., None]
 
 
 def eliminated(H: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
@@ -104,7 +104,8 @@ def eliminated(H: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
         return H, 0.0
     chol = linalg.cholesky(with_prior(H[np.ix_(columns, columns)]), lower=True)
     half = linalg.solve_triangular(chol, H[columns], lower=True)
-    return H - half.T @ half, 2.0 * float(np.log(np.diag(chol)).sum())
+    # What is left of a column that these explain but for a trace may be less than it was rounded by.
+    return H - half.T @ half + np.diag(ROUNDING * np.diag(H)), 2.0 * float(np.log(np.diag(chol)).sum())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -194,7 +195,7 @@ def gains(
     gain, mean = np.full(count, -np.inf), np.full((count, width), np.nan)
     for group in groups:
         index, k = group.columns, group.columns.shape[1]
-        M = H[index[:, :, None], index[:, None, :]] + np.eye(k)
+        M = with_prior(H[index[:, :, None], index[:, None, :]])
         b = H[index, -1]
         if half is not None:
             part = half[:, index]
@@ -209,6 +210,5 @@ def gains(
 
 def gain_of(H: np.ndarray, columns: np.ndarray) -> float:
     """Log evidence that one group of amplitudes adds."""
-    M = H[np.ix_(columns, columns)] + np.eye(len(columns))
-    b = H[columns, -1]
+    M, b = with_prior(H[np.ix_(columns, columns)]), H[columns, -1]
     return 0.5 * float(b @ np.linalg.solve(M, b)) - 0.5 * float(np.linalg.slogdet(M)[1])
