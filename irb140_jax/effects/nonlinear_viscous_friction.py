@@ -34,6 +34,13 @@ class NonlinearViscousFriction(AbstractEffect):
     def refines(self):
         return True
 
+    def finer(self, grid, best):
+        # Beyond the ends of the grid as well: of a law that bends more, dry or viscous friction would be left over.
+        values = np.sort(grid[:, 0])
+        values = np.array([values[0] ** 2 / values[1], *values, values[-1] ** 2 / values[-2]])
+        at = int(np.argmin(np.abs(values - best[0])))
+        return np.geomspace(values[at - 1], values[at + 1], len(grid))[:, None]
+
     def columns(self, motion, joints, shape):
         # Powers of |qd| have no slope at rest: the rounded sign keeps them smooth.
         qd = of_site(motion.qd, joints)
