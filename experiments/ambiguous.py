@@ -17,6 +17,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import tyro
+from pages import page_of
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.errors import InputError
@@ -30,7 +31,6 @@ from irb140_jax.recordings.excite import Excitation, fourier_motion, slow_motion
 from irb140_jax.recordings.segments import Segment, segment_motion
 from irb140_jax.robot import Robot, load_robot
 
-DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs" / "ambiguous.md"
 RATE = 1000.0  # [1/s] steps of MuJoCo
 SECONDS = 12.0  # of each poor recording
 EFFECTS = (
@@ -218,7 +218,8 @@ def main() -> None:
             r = rows[-1]
             states = [f"{k}: {r[k]['state']}" for k in LABELS.values() if k in r]
             print(seed, r["motion"], r["truth"]["effect"], r["truth"]["joints"], *states, flush=True)
-    DOCS.write_text(page(sorted(rows, key=lambda r: r["seed"])), encoding="utf-8")
+    text = page(sorted(rows, key=lambda r: r["seed"]))
+    page_of(config.out.parent, "ambiguous.md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -6,8 +6,8 @@ import pathlib
 import numpy as np
 from hand_arms import ARMS
 from hand_laws import ORDINARY
+from pages import page_of
 
-PAGE = pathlib.Path(__file__).resolve().parents[1] / "docs" / "arms-by-hand.md"
 OPENING = """# Arms and physics by hand
 
 Written by `experiments/arms_by_hand.py` from `results/arms_by_hand_*.jsonl`; don't edit. Six arms (a pendulum, two
@@ -141,4 +141,4 @@ def write(paths: dict[str, pathlib.Path]) -> None:
     for kind, opening in openings.items():
         if cases := read(paths[kind]):
             lines += [opening, *table(cases, ORDINARY if "rough" in kind else (), by_law="parts" in kind)]
-    PAGE.write_text("\n".join(lines), encoding="utf-8")
+    page_of(paths["clean"].parent, "arms-by-hand.md").write_text("\n".join(lines), encoding="utf-8")

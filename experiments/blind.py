@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 import tyro
+from pages import page_of
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.errors import InputError
@@ -27,8 +28,6 @@ from irb140_jax.recordings.concealed.hidden import survey_of
 from irb140_jax.recordings.concealed.plant import arm_model, arm_spec
 from irb140_jax.recordings.excite import three_motions
 from irb140_jax.robot import irb140, load_robot, robot_from_model
-
-DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs" / "blind.md"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,7 +174,7 @@ def main() -> None:
             say = lambda items: [(i["effect"], *i["joints"]) for i in items]  # noqa: E731
             print(mark, seed, "hidden", say(case["truth"]), "found", say(case["found"]), case["verdict"],
                   f"corrected/refit {case['corrected'] / case['refit']:.3f}", flush=True)  # fmt: skip
-    DOCS.write_text(table(config.out), encoding="utf-8")
+    page_of(config.out, "blind.md").write_text(table(config.out), encoding="utf-8")
 
 
 if __name__ == "__main__":

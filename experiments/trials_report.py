@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 
 import numpy as np
+from pages import page_of
 
 from irb140_jax.effects.catalogue import CATALOGUE
 
-DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs" / "trials.md"
 FAINT = 0.005  # of its joint's torque: what of the hidden physics makes less is counted apart
 NINETY = 1.645  # standard deviations either way that a 90 % interval spans
 ORDINARY = ("coulomb_friction", "viscous_friction")
@@ -329,4 +329,4 @@ def write(out: pathlib.Path) -> None:
         if kind in ("single", "rough", "several"):
             lines += _by_effect(cases)
         lines += ["", "### Every miss", *(_misses_outside if kind == "outside" else _misses)(cases)]
-    DOCS.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    page_of(out, "trials.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
