@@ -344,7 +344,7 @@ def test_a_model_corrected_by_effects_of_zero_strength_predicts_the_nominal_torq
 @pytest.mark.parametrize("true", [0.33, 0.36, 3.6])
 def test_the_exponent_of_viscous_friction_may_lie_beyond_the_first_grid(true):
     law = CATALOGUE["nonlinear_viscous_friction"]
-    grid = law.shapes(None, np.array([0]))
+    grid = law.shapes(SCALES, np.array([0]))
     assert not grid.min() < true < grid.max()
     for _ in range(2):  # as often as a diagnosis refines
         grid = law.finer(grid, grid[np.argmin(np.abs(grid[:, 0] - true))])
