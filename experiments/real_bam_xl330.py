@@ -28,6 +28,7 @@ from jaxtyping import Array, Float
 from scipy import optimize
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
+from irb140_jax.errors import InputError
 from irb140_jax.mismatch import diagnose
 from irb140_jax.recordings import Recording, read_recording
 from irb140_jax.recordings.machines.bam_xl330 import KT, LENGTH, MASS, R, servo_recording, servo_runs, write_servo
@@ -51,6 +52,11 @@ class Config:
     seed: int = 0
     scatters: tuple[float, ...] = (0.0, 0.1, 0.2, 0.4)
     """Standard deviations of the numbers, in the logarithm, that are told for comparison."""
+    copies: int = 64
+    """Servos with scattered numbers, over which an error is expected: half of them mirror images."""
+    redrawn: tuple[int, ...] = (16, 64)
+    """Numbers of copies that are told for comparison, each drawn anew `draws` times."""
+    draws: int = 4
 
 
 class Servo(eqx.Module):
@@ -96,7 +102,6 @@ COULOMB_AND_VISCOUS = ("gain", "rotor", "viscous", "brake", "coulomb")
 NAMED = {"load": "load_coefficient", "coulomb": "coulomb"}  # numbers of the servo as the diagnosis calls them
 DOUBTED = ("load_coefficient", "viscous", "inertia")
 WITHIN = 3.0  # standard deviations of the diagnosis
-COPIES = 64  # servos with scattered numbers, over which an error is expected: half of them mirror images
 LEAST = 1e-4  # of a number that may be nothing: searches go over logarithms
 Bounds = dict[str, tuple[float, float]]
 
@@ -158,7 +163,7 @@ def refitted(
     middle, rng = np.log([START[name] for name in free]), np.random.default_rng(config.seed)
     starts = [middle, *(middle + APART * rng.normal(size=(config.starts - 1, len(free))))]
     starts += [np.log([max(float(getattr(servo, name)), LEAST) for name in free]) for servo in near]
-    half = scatter * np.random.default_rng(config.seed + 1).normal(size=(COPIES // 2, len(free)))
+    half = scatter * np.random.default_rng(config.seed + 1).normal(size=(config.copies // 2, len(free)))
     copies = np.vstack([half, -half]) if scatter else np.zeros((1, len(free)))
     found = [nearest_optimum(free, bounds, start, copies, seen, config.evaluations) for start in starts]
     return [servo for _, servo in sorted(found, key=lambda one: one[0])]
@@ -192,9 +197,15 @@ def doubt(findings: list[dict]) -> float:
     """Relative standard deviation of what the diagnosis says of the servo's numbers, root mean square.
 
     Those count that are told from nothing.
+
+    Raises:
+        InputError: There are none.
     """
     told = [p for f in findings for name, p in f["parameters"].items() if name in DOUBTED]
-    return float(np.sqrt(np.mean([(p["std"] / p["value"]) ** 2 for p in told if p["value"] > 2.0 * p["std"]])))
+    doubts = [p["std"] / p["value"] for p in told if p["value"] > 2.0 * p["std"]]
+    if not doubts:
+        raise InputError("nothing that was named tells a number of the servo; there is no doubt to refit it by")
+    return float(np.sqrt(np.mean(np.square(doubts))))
 
 
 def compared(free: Sequence[str], runs: dict[str, tuple[int, Recording]], config: Config) -> list[dict[str, float]]:
@@ -210,6 +221,18 @@ def compared(free: Sequence[str], runs: dict[str, tuple[int, Recording]], config
         judged = errors.pop(JUDGED)
         left_out = float(np.mean(list(errors.values())))
         out.append({"scatter": scatter, "error_on_a_gain_left_out": left_out, "error_judged": judged})
+    return out
+
+
+def redrawn(free: Sequence[str], seen: Run, judged: Run, config: Config, scatter: float) -> list[dict]:
+    """By number of copies: errors judged of refits from the data sheet, each over copies of its own."""
+    out = []
+    for copies in config.redrawn:
+        draws = [
+            refitted(free, {}, seen, dataclasses.replace(config, copies=copies, starts=1, seed=seed), scatter)[0]
+            for seed in range(1, 1 + config.draws)
+        ]
+        out.append({"copies": copies, "errors_judged": [float(jnp.mean(error(servo, judged))) for servo in draws]})
     return out
 
 
@@ -241,6 +264,7 @@ def run(config: Config) -> dict:
         **{key: diagnosis[key] for key in ("verdict", "summary", "findings", "unexplained", "fit")},
         "simulation": simulation, "goal": GOAL, "scatter": scatter,
         "other_scatters": compared(list(laws.values())[-1][0], runs, config),
+        "other_draws": redrawn(list(laws.values())[-1][0], seen, judged, config, scatter),
     }  # fmt: skip
 
 

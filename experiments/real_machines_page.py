@@ -43,6 +43,10 @@ def servo(result: dict) -> list[str]:
         f"| {r['scatter']:.0%} | {r['error_on_a_gain_left_out']:.4f} | {r['error_judged']:.4f} |"
         for r in result["other_scatters"]
     ]
+    drawn = [
+        f"| {r['copies']} | {', '.join(f'{x:.4f}' for x in sorted(r['errors_judged']))} |"
+        for r in result["other_draws"]
+    ]
     judged = [optima[0]["error_judged"] for optima in result["simulation"].values()]
     free = result["simulation"]["with load-dependent friction, as named"][0]["numbers"]
     told = next(f for f in result["findings"] if f["effect"] == "load_dependent_friction")["parameters"]
@@ -72,7 +76,9 @@ def servo(result: dict) -> list[str]:
         "free figures were known; it holds no number but the diagnosis' own.)", "",
         "Other scatters, freely refitted, the best optimum. That width was settled when judged figures of others were",
         "known; one gain of three left out at a time would prefer more scatter, but tells little between any of them:",
-        "", "| scatter of the numbers | error on the gain left out | runs judged |", "|---|---|---|", *tried,
+        "", "| scatter of the numbers | error on the gain left out | runs judged |", "|---|---|---|", *tried, "",
+        "Copies drawn anew, refitted freely from the data sheet, runs judged:", "",
+        "| copies | every draw |", "|---|---|", *drawn,
     ]  # fmt: skip
 
 

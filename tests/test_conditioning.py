@@ -12,7 +12,7 @@ from irb140_jax import dynamics
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.model import CorrectedModel, Named, predict
-from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.condition import choose_band, condition, conditioned
 from irb140_jax.recordings.direction import direction_of
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
@@ -346,6 +346,13 @@ def test_a_joint_that_sticks_while_its_encoder_flickers_between_two_counts_is_at
     smooth = condition(logged(t, count * (np.round(moving / count) + flicker)), BAND)
     stuck = (smooth.t > 4.5) & (smooth.t < 7.5)
     assert not smooth.usable[stuck].any() and smooth.usable[(smooth.t > 0.5) & (smooth.t < 3.5)].mean() > 0.8
+
+
+def test_a_joint_that_creeps_is_at_rest_beside_recordings_in_which_it_moves():
+    t = times()
+    creeping, slow, moving = (logged(t, x * wave(t, 0.5)[0]) for x in (2e-4, 2e-2, 1.0))
+    alone, beside, no_creep = (conditioned(x, BAND)[0] for x in ((creeping,), (creeping, moving), (slow, moving)))
+    assert alone.usable.mean() > 0.9 and no_creep.usable.mean() > 0.9 and not beside.usable.any()
 
 
 def test_slow_motion_over_many_counts_is_no_rest():

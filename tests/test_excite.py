@@ -7,6 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from irb140_jax import cli
 from irb140_jax.errors import InputError
@@ -51,13 +53,24 @@ def segments():
 
 
 @pytest.mark.parametrize("segment", segments(), ids=lambda s: f"{s.kind}-{s.joint}")
-def test_a_piece_starts_and_ends_at_rest_within_all_limits(segment):
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**31))
+def test_a_piece_starts_and_ends_at_rest_within_all_limits(segment, seed):
     robot = arm()[1]
-    m, limits = segment_motion(robot, segment, 8.0, RATE), motion_limits(robot, 1.0)
+    m, limits = segment_motion(robot, dataclasses.replace(segment, seed=seed), 8.0, RATE), motion_limits(robot, 1.0)
     assert np.abs(m.qd[[0, -1]]).max() < 1e-6
     assert (m.q >= limits.lower - 1e-9).all() and (m.q <= limits.upper + 1e-9).all()
     assert (np.abs(m.qd) <= limits.speed).all() and (np.abs(m.qdd) <= limits.acceleration).all()
     assert np.ptp(m.q[:, 1]) > 1e-3
+
+
+def test_small_reversals_in_a_posture_at_a_limit_are_not_cut_off():
+    robot = arm()[1]
+    limits = motion_limits(robot, 1.0)
+    for seed in range(60):
+        m = segment_motion(robot, Segment("micro", None, 0.7, 0.3, seed), 8.0, RATE)
+        assert (m.q >= limits.lower - 1e-9).all() and (m.q <= limits.upper + 1e-9).all()
+        assert np.abs(np.diff(m.qdd, axis=0)).max() < 0.2 * np.abs(m.qdd).max()
 
 
 @pytest.mark.parametrize("segment", segments(), ids=lambda s: f"{s.kind}-{s.joint}")

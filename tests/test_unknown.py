@@ -27,3 +27,13 @@ def test_it_is_located_by_joint_and_variables_and_not_named(slug):
     (rest,) = diagnosis["unexplained"]
     assert rest["joints"] == [joint]
     assert variables in str(rest)
+
+
+def test_viscous_friction_stays_beside_friction_that_grows_with_load_where_more_is_left():
+    robot, joint = irb140(), ("joint2",)
+    motions = three_motions(robot, 15.0, 500.0, seed=1)
+    hidden = {"load_dependent_friction": SHARE, "viscous_friction": 0.06, "cross_damping": SHARE}
+    case = conceal(str(irb140_path()), [Concealment(e, joint, share) for e, share in hidden.items()], motions, seed=2)
+    diagnosis = diagnose(robot, case.recordings).diagnosis
+    assert {f["effect"] for f in diagnosis["findings"]} == {"load_dependent_friction", "viscous_friction"}
+    assert [u["joints"] for u in diagnosis["unexplained"]] == [["joint2"]]

@@ -191,10 +191,8 @@ class AbstractEffect(abc.ABC):
         return False
 
     def finer(self, grid: np.ndarray, best: np.ndarray) -> np.ndarray:
-        """As many grid points as before, between the neighbours of the best one (one parameter, equal ratios)."""
-        values = np.sort(grid[:, 0])
-        at = int(np.argmin(np.abs(values - best[0])))
-        return np.geomspace(values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)], len(values))[:, None]
+        """As many grid points as before, around the best one (by default one parameter; see `between_neighbours`)."""
+        return between_neighbours(grid, best)
 
     def scan(self, scales: Scales, joints: np.ndarray) -> np.ndarray:
         """Many shapes to try one by one before the search, shape (points, shape parameters); none by default.
@@ -328,6 +326,21 @@ class AbstractEffect(abc.ABC):
 def of_site(array: JointSamples, joints: Int[Array, " m"]) -> Float[Array, "T m"]:
     """The columns of a (T, n) array that belong to the joints of a site."""
     return jnp.take(array, joints, axis=1)
+
+
+def between_neighbours(grid: np.ndarray, best: np.ndarray, *, beyond: bool = False) -> np.ndarray:
+    """As many grid points of one parameter, in equal ratios, between the neighbours of the best, shape (points, 1).
+
+    Args:
+        grid: As it was, shape (points, 1).
+        best: Its best point, shape (1,).
+        beyond: Whether an end of the grid has a neighbour outside of it.
+    """
+    values = np.sort(grid[:, 0])
+    if beyond:
+        values = np.array([values[0] ** 2 / values[1], *values, values[-1] ** 2 / values[-2]])
+    at = int(np.argmin(np.abs(values - best[0])))
+    return np.geomspace(values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)], len(grid))[:, None]
 
 
 def geometric_grid(low: float, high: float, points: int) -> np.ndarray:

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.base import AbstractEffect, Parameter, between_neighbours, of_site
 
 
 class NonlinearViscousFriction(AbstractEffect):
@@ -35,11 +35,8 @@ class NonlinearViscousFriction(AbstractEffect):
         return True
 
     def finer(self, grid, best):
-        # Beyond the ends of the grid as well: of a law that bends more, dry or viscous friction would be left over.
-        values = np.sort(grid[:, 0])
-        values = np.array([values[0] ** 2 / values[1], *values, values[-1] ** 2 / values[-2]])
-        at = int(np.argmin(np.abs(values - best[0])))
-        return np.geomspace(values[at - 1], values[at + 1], len(grid))[:, None]
+        # Of a law that bends more than any on the grid, dry or viscous friction would be left over.
+        return between_neighbours(grid, best, beyond=True)
 
     def columns(self, motion, joints, shape):
         # Powers of |qd| have no slope at rest: the rounded sign keeps them smooth.

@@ -20,7 +20,7 @@ from irb140_jax.mismatch.testable import Site, not_testable, reference, visibili
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
 from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
-from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.condition import choose_band, conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
@@ -88,7 +88,7 @@ def _diagnosed(
 ) -> Result:
     progress("smoothing and differentiating the positions")
     band = choose_band(list(recordings), robot)
-    smooth = [condition(r, band) for r in recordings]
+    smooth = conditioned(recordings, band)
     rows = [len(band.kept(len(r.t))) for r in smooth]
     if sum(rows) < FEWEST_ROWS or min(rows) < FEWEST_ROWS // 5:
         raise RecordingError(

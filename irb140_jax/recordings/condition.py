@@ -5,6 +5,7 @@ from measurement and model alike.
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -22,6 +23,7 @@ MAX_TORQUE_BAND = 20.0  # Hz; above this, arms are not rigid and motor torque ho
 MIN_TORQUE_BAND = 4.0  # Hz; friction reversals are steps, a narrower band would blur them into the inertia
 WORKING_RATE = 200.0  # Hz; columns are evaluated at least this often
 SLOW = 3.0  # Hz; below, model and log may differ by the very friction that is looked for
+CREEPING = 1e-3  # of a joint's highest speed in any recording: slower, what holds it may be dry friction that gives way
 INCOHERENT = 0.05  # share of the model's torque that may be noise: what biases parameters by as much
 
 
@@ -127,6 +129,19 @@ def _coherent_limit(smooth: list["Conditioned"], robot: Robot, band: Band) -> fl
     return limit
 
 
+def conditioned(recordings: Sequence[Recording], band: Band) -> list[Conditioned]:
+    """Recordings that are compared with one model; see `condition`.
+
+    Where a joint is held by dry friction it still creeps, as friction gives way before it slips, and encoders may be
+    fine enough to see it.  Beside recordings in which the joint moves, such rows are no motion.
+    """
+    smooth = [condition(r, band) for r in recordings]
+    fastest = np.max([np.abs(r.qd).max(axis=0, initial=0.0) for r in smooth], axis=0)
+    creeping = [_held(np.abs(r.qd) < CREEPING * fastest, band.rate) for r in smooth]
+    usable = [r.usable & ~_widened(c, band.rate) for r, c in zip(smooth, creeping, strict=True)]
+    return [dataclasses.replace(r, usable=u) for r, u in zip(smooth, usable, strict=True)]
+
+
 def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditioned:
     """Even grid, despiked torque, smoothed and differentiated motion.
 
@@ -154,9 +169,8 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     q, qd, qdd, tau = (_at(grid, t, x) for x in (*smoothed, tau))
     rest_speed = np.maximum(np.maximum(3.0 * speed_noise, 0.003 * np.abs(qd).max(axis=0, initial=0.0)), 1e-6)
     direction = direction_of(qd, rest_speed, band.rate)
-    slow = ndimage.minimum_filter1d((np.abs(qd) < rest_speed).astype(float), int(REST * band.rate) | 1, axis=0)
     stuck = _at(grid, recording.t, _within_a_step(recording).astype(float))
-    resting = ndimage.maximum_filter1d(np.maximum(slow, stuck), int(2 * REST * band.rate) | 1, axis=0) > 0.5
+    resting = _widened(np.maximum(_held(np.abs(qd) < rest_speed, band.rate), stuck), band.rate)
     # A gap spoils what the smoother and, later, the low-pass reach from it; half their length holds most of that.
     reach = (int(np.ceil(half / raw_rate * band.rate)) + (len(band.low_pass()) - 1) // 2) // 2
     lost = ndimage.maximum_filter1d((np.interp(grid, t, missing.astype(float)) > 0).astype(int), 2 * reach + 1) > 0
@@ -165,6 +179,16 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
         notes.append(f"{spikes} torque spikes were replaced by the median of their neighbours")
     usable, began = ~resting & ~lost[:, None], float(recording.t[0])
     return Conditioned(recording.source, grid, q, qd, qdd, tau, usable, rest_speed, direction, tuple(notes), began)
+
+
+def _held(slow: np.ndarray, rate: float) -> np.ndarray:
+    """Where a joint is slow for as long as `REST`, the middle of that, from 0 to 1, shape (T, n)."""
+    return ndimage.minimum_filter1d(slow.astype(float), int(REST * rate) | 1, axis=0)
+
+
+def _widened(held: np.ndarray, rate: float) -> np.ndarray:
+    """That, and as much again about it, shape (T, n)."""
+    return ndimage.maximum_filter1d(held, int(2 * REST * rate) | 1, axis=0) > 0.5
 
 
 def _within_a_step(recording: Recording) -> np.ndarray:

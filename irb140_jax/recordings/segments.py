@@ -116,12 +116,15 @@ def _micro(robot: Robot, segment: Segment, duration: float, rate: float) -> Exci
     omega = 2.0 * np.pi * segment.frequency
     most = np.minimum(np.minimum(limits.speed / omega, limits.acceleration / omega**2), 0.03 * span)
     moving = np.ones(robot.n) if segment.joint is None else np.eye(robot.n)[segment.joint]
+    size = 0.8 * moving * most
+    # A posture at a limit is moved off it: a wave cut off there would stop at once.
+    middle = np.clip(_posture(robot, segment.seed), limits.lower + size, limits.upper - size)
     growth = 0.05 + 0.95 * (t / t[-1])
     ends = np.minimum(np.minimum(t, t[-1] - t) / max(1.0 / segment.frequency, 0.5), 1.0)
     envelope = growth * ends**3 * (10.0 - 15.0 * ends + 6.0 * ends**2)
     phase = rng.uniform(0.0, 2.0 * np.pi, robot.n)
-    q = _posture(robot, segment.seed) + 0.8 * moving * most * envelope[:, None] * np.sin(omega * t[:, None] + phase)
-    return _with_rates("micro", t, np.clip(q, limits.lower, limits.upper), rate)
+    q = middle + size * envelope[:, None] * np.sin(omega * t[:, None] + phase)
+    return _with_rates("micro", t, q, rate)
 
 
 def _strokes(name: str, points: Sequence[np.ndarray], time: float, ramps: Sequence[float], rate: float) -> Excitation:
