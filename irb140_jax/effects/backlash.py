@@ -40,6 +40,7 @@ class Backlash(AbstractEffect):
     )
     variants = ((0, 1),)
     own = (0,)
+    settled = 0.6  # true ones are 0.64 and more; half a gap of a few encoder noises takes that noise from the torque
     confused_with = {
         "presliding_hysteresis": "reversals under different preload",
         "joint_elasticity": "load reversals of several sizes: a gap is crossed whole, a spring bends in proportion",

@@ -139,6 +139,7 @@ class AbstractEffect(abc.ABC):
         alters: Slug of the law that it alters: it stands beside that, or one that contains it, or not at all.
         silent: It competes with what was left out, and is not that: no finding bears its name.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
+        settled: Least amplitude of those once the grid of shapes is fine.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
         steps: Whether it can be simulated forward in time all the same (see `memory` and `step`).
     """
@@ -174,6 +175,7 @@ class AbstractEffect(abc.ABC):
     alters: ClassVar[str | None] = None
     silent: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)
+    settled: ClassVar[float] = -np.inf
     history: ClassVar[str | None] = None
     steps: ClassVar[bool] = False
 

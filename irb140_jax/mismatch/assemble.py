@@ -79,8 +79,15 @@ def assemble(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data
     return Data(out, scale, (*lib.candidates, *extra), nuisances)
 
 
-def problem(data: Data, noise: Noise, blocks: int = BLOCKS) -> tuple[Problem, Grams]:
-    """Gram matrices under a noise model, ready for the search; with fewer blocks where only their sum is needed."""
+def problem(data: Data, noise: Noise, blocks: int = BLOCKS, *, settled: bool = True) -> tuple[Problem, Grams]:
+    """Gram matrices under a noise model, ready for the search; with fewer blocks where only their sum is needed.
+
+    Args:
+        data: The rows.
+        noise: Their whitening.
+        blocks: Per recording.
+        settled: Whether the grids of shapes are as fine as they get.
+    """
     g = grams(data.stretches, noise, data.scale, data.nuisances, blocks)
     H, _ = eliminated(g.total(), np.arange(data.nuisances))
     sites = len({(c.slug, c.joints) for c in data.candidates})
@@ -105,14 +112,16 @@ def problem(data: Data, noise: Noise, blocks: int = BLOCKS) -> tuple[Problem, Gr
         s = data.scale[data.nuisances + c.columns]
         # What is there only if it is more than nothing, but moves nothing here, can't be found.
         unseen = (s == 0.0) & (c.lowest == 0.0)
-        lowest[i, : len(c.columns)] = np.where(unseen, np.inf, c.lowest / np.where(s > 0, s, 1.0))
+        own = settled & np.isin(c.variant, c.effect.own)
+        at_least = np.where(own, np.maximum(c.lowest, c.effect.settled), c.lowest)
+        lowest[i, : len(c.columns)] = np.where(unseen, np.inf, at_least / np.where(s > 0, s, 1.0))
         highest[i, : len(c.columns)] = c.highest / np.where(s > 0, s, 1.0)
         if c.effect.adds_up:
             summed[i, : len(c.columns)], least[i] = s, c.lowest[0]
     energy = np.full((len(data.stretches), g.rows.shape[1]), 1e-300)
     for r, s in enumerate(data.stretches):
         for j in range(energy.shape[1]):
-            white = noise.whitened(s.tau[:, j], j, r)
+            white = noise.whitened(s.tau[:, j], j, r, s.unsure[:, j])
             energy[r, j] += np.sum(white[noise.usable(s.use[:, j], j)] ** 2)
     offset = data.nuisances
     entry = rare - log_prior
@@ -145,4 +154,4 @@ def first_noise(data: Data) -> Noise:
         v = vectors @ (projected / (values + variance))
         for s, r in zip(data.stretches, residuals, strict=True):
             r[:, j] = s.y[:, j] - s.X[:, j][:, keep] @ (v * data.scale[keep])
-    return noise_from_residuals(residuals, use, dof)
+    return noise_from_residuals(residuals, use, dof, [s.unsure for s in data.stretches])

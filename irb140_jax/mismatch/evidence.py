@@ -84,7 +84,7 @@ def _grams_of_joint(
     out, count = [], []
     for s in stretches:
         A = np.concatenate([s.X[:, j][:, active] * scale[active], s.y[:, j : j + 1]], axis=1)
-        A, usable = noise.whitened(A, j, s.recording), noise.usable(s.use[:, j], j)
+        A, usable = noise.whitened(A, j, s.recording, s.unsure[:, j]), noise.usable(s.use[:, j], j)
         edges = np.linspace(0, len(A), blocks + 1).astype(int)
         for block in map(slice, edges[:-1], edges[1:]):
             part = A[block][usable[block]]

@@ -103,7 +103,7 @@ def explain(
         rows = [stretch(lib, r, i, band, factor, load, at) for i, (r, load) in enumerate(both)]
         data = assemble(lib, rows, uncertainty)
         progress(f"searching sets of explanations (round {turn})")
-        return _settled(lib, scales, data, factor, chosen, noise, blocks)
+        return _settled(lib, scales, data, factor, chosen, noise, blocks, settled=turn > 1)
 
     for turn in range(1, PASSES):
         ex = explained(turn, blocks=1)
@@ -119,7 +119,7 @@ def explain(
 
 def _settled(
     lib: Library, scales: Scales, data: Data, factor: np.ndarray, chosen: tuple[int, ...], noise: Noise | None,
-    blocks: int,
+    blocks: int, *, settled: bool,
 ) -> Explanation:  # fmt: skip
     """Search and noise in turn: noise that the last explanation left may hide an effect that it named wrongly."""
     # The noise of the round before is nearly right; the first is a guess, under which a full search would take minutes
@@ -127,11 +127,11 @@ def _settled(
     rounds = (search,) if noise else (guessed, search)
     noise = noise or first_noise(data)
     for find in rounds:
-        prob, g = problem(data, noise, blocks=1)
+        prob, g = problem(data, noise, blocks=1, settled=settled)
         chosen = find(prob, chosen)
         noise = _noise_under(data, prob, g, chosen)
         del prob, g  # hundreds of megabytes, before the next are made
-    prob, g = problem(data, noise, blocks)
+    prob, g = problem(data, noise, blocks, settled=settled)
     return Explanation(lib, scales, data, noise, prob, g, search(prob, chosen), factor)
 
 
@@ -161,7 +161,8 @@ def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -
     n = residuals[0].shape[1]
     # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
     used = len(post.columns) - float(np.trace(post.cov))
-    return noise_from_residuals(residuals, [s.use for s in data.stretches], np.full(n, used / n))
+    use, unsure = [s.use for s in data.stretches], [s.unsure for s in data.stretches]
+    return noise_from_residuals(residuals, use, np.full(n, used / n), unsure)
 
 
 def _named(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:

@@ -16,6 +16,8 @@ ORDER = 10  # lags; at about twice the band this spans a quarter of a second
 SPECTRUM = 256  # points of the spectrum
 RIDGE = 1e-3
 ENOUGH = 0.5  # of the rows, which must have all their lags for correlations to be known pair by pair
+ROUNDS = 5  # in which noise and what some rows are unsure by beside it are told apart
+LEAST = 0.2  # of a residual, that is noise
 NEGLIGIBLE = 0.1  # weight of every lag, of the row's own, below which noise is white: no row needs those before it
 
 
@@ -33,8 +35,16 @@ class Noise:
     level: np.ndarray
     total: np.ndarray
 
-    def whitened(self, x: np.ndarray, joint: int, recording: int) -> np.ndarray:
-        """Rows of one joint (axis 0) with white noise of unit variance; only `usable` ones are to be used."""
+    def whitened(self, x: np.ndarray, joint: int, recording: int, unsure: np.ndarray | float = 0.0) -> np.ndarray:
+        """Rows of one joint (axis 0) with white noise of unit variance; only `usable` ones are to be used.
+
+        Args:
+            x: The rows, shape (R, ...).
+            joint, recording: Of the rows.
+            unsure: Standard deviation of what they are unsure by beside the noise, shape (R,) [N m or N].
+        """
+        louder = spread(unsure, self.total[recording, joint])
+        x = x / np.reshape(louder, np.shape(louder) + (1,) * (x.ndim - np.ndim(louder)))
         return signal.lfilter(self.ar[joint], [1.0], x, axis=0) / self.level[recording, joint]
 
     def usable(self, use: np.ndarray, joint: int) -> np.ndarray:
@@ -44,27 +54,34 @@ class Noise:
         return runs == lags + 1
 
 
-def noise_from_residuals(residuals: list[np.ndarray], use: list[np.ndarray], dof: np.ndarray) -> Noise:
+def spread(unsure: np.ndarray | float, total: np.ndarray | float) -> np.ndarray:
+    """How many times as loud as the noise a row is that is unsure by so much beside it."""
+    return np.sqrt(1.0 + (np.asarray(unsure) / total) ** 2)
+
+
+def noise_from_residuals(
+    residuals: list[np.ndarray], use: list[np.ndarray], dof: np.ndarray, unsure: list[np.ndarray] | None = None
+) -> Noise:
     """Fit the noise model.
 
     Args:
         residuals: Per recording, (R, n) [N m or N].
         use: Per recording, the rows to count, (R, n).
         dof: Parameters already fitted to each joint's rows, shape (n,).
+        unsure: Per recording, what rows are unsure by beside the noise, (R, n) [N m or N]; by default nothing.
 
     Returns:
         The noise model; levels never fall below 1e-9 of a unit, so that noise-free input stays finite.
     """
-    n = residuals[0].shape[1]
+    n, unsure = residuals[0].shape[1], unsure or [np.zeros_like(r) for r in residuals]
     ar = np.zeros((n, ORDER + 1))
     level, total = np.zeros((len(residuals), n)), np.zeros((len(residuals), n))
     for j in range(n):
-        scale = [np.sqrt(np.mean(r[u[:, j], j] ** 2)) if u[:, j].any() else 0.0
-                 for r, u in zip(residuals, use, strict=True)]  # fmt: skip
+        scale = [_size(r[u[:, j], j], b[u[:, j], j]) for r, u, b in zip(residuals, use, unsure, strict=True)]
         # Each recording counts by its shape, not by its size: the loudest must not decide the colour.
         acov = np.zeros((2, ORDER + 1))
-        for r, u, s in zip(residuals, use, scale, strict=True):
-            acov += _autocovariance(r[:, j] / s, u[:, j]) if s > 0 else 0.0
+        for r, u, b, s in zip(residuals, use, unsure, scale, strict=True):
+            acov += _autocovariance(r[:, j] / (s * spread(b[:, j], s)), u[:, j]) if s > 0 else 0.0
         ar[j], innovation = _whitener(_per_pair(*acov))
         rows = sum(int(u[:, j].sum()) for u in use)
         inflate = np.sqrt(rows / max(rows - dof[j], 0.2 * rows, 1.0))
@@ -76,6 +93,14 @@ def noise_from_residuals(residuals: list[np.ndarray], use: list[np.ndarray], dof
         median = np.array([np.median(c[c > 0]) if np.any(c > 0) else 1.0 for c in x.T])
         np.copyto(x, median, where=x <= 0)
     return Noise(ar, np.maximum(level, 1e-9), np.maximum(total, 1e-9))
+
+
+def _size(residual: np.ndarray, unsure: np.ndarray) -> float:
+    """Standard deviation of the noise in a residual that is unsure by more in some rows; 0 without rows."""
+    size = whole = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
+    for _ in range(ROUNDS if whole > 0.0 else 0):
+        size = max(float(np.sqrt(np.mean((residual / spread(unsure, size)) ** 2))), LEAST * whole)
+    return size
 
 
 def _autocovariance(x: np.ndarray, use: np.ndarray) -> np.ndarray:

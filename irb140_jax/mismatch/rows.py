@@ -25,6 +25,7 @@ class Stretch:
         rigid: Columns of the inertials under the model's own gravity and before the log, (R, n, 10 n).
         tau: Logged torque, low-passed, (R, n).
         nominal: Nominal torque, low-passed, (R, n).
+        unsure: Standard deviation that the samples of the log leave open of tau, (R, n); see `Conditioned`.
         use: Rows in which the joint moves and nothing is lost, (R, n).
         q, qd, qdd: Motion at the rows, (R, n), for maps and the flexible competitor.
         tool, tool_jacobian: Where the tool is and how joints move it, (R, 3) and (R, n, 3); see `RigidBody`.
@@ -38,6 +39,7 @@ class Stretch:
     rigid: np.ndarray
     tau: np.ndarray
     nominal: np.ndarray
+    unsure: np.ndarray
     use: np.ndarray
     q: np.ndarray
     qd: np.ndarray
@@ -85,7 +87,7 @@ def stretch(
     nominal, tau = band.apply(nominal), band.apply(recording.tau)
     y = tau - band.apply(base) + band.apply(twice)
     return Stretch(
-        index, recording.t[kept], recording.began, X, y, rigid, tau, nominal, recording.usable[kept],
-        recording.q[kept], recording.qd[kept], recording.qdd[kept],
+        index, recording.t[kept], recording.began, X, y, rigid, tau, nominal, recording.unsure[kept],
+        recording.usable[kept], recording.q[kept], recording.qd[kept], recording.qdd[kept],
         np.asarray(along.rigid.tool)[kept], np.asarray(along.rigid.tool_jacobian)[kept],
     )  # fmt: skip

@@ -9,6 +9,7 @@ from irb140_jax.mismatch.along import Prepared
 from irb140_jax.mismatch.assemble import Data, assemble
 from irb140_jax.mismatch.candidates import Library, library, reshaped
 from irb140_jax.mismatch.evidence import layouts
+from irb140_jax.mismatch.noise import spread
 from irb140_jax.mismatch.rows import Stretch, stretch
 from irb140_jax.recordings.low_pass import Band
 
@@ -95,7 +96,8 @@ def left_over(data: Data, columns: np.ndarray, noise: np.ndarray) -> LeftOver:
     join = lambda name: _thinned(data.stretches, lambda s: getattr(s, name))  # noqa: E731
     recording = _thinned(data.stretches, lambda s: np.full(len(s.t), s.recording))
     t = _thinned(data.stretches, lambda s: s.t - s.begin)
-    weight = np.where(join("use"), 1.0 / np.maximum(noise, 1e-9)[recording], 0.0)
+    level = np.maximum(noise, 1e-9)[recording]
+    weight = np.where(join("use"), 1.0 / (level * spread(join("unsure"), level)), 0.0)
     X = _thinned(data.stretches, lambda s: s.X[..., columns]) * data.scale[columns]
     return LeftOver(
         recording, t, join("q"), join("tool"), join("tool_jacobian"), weight, join("y") * weight, X * weight[..., None]

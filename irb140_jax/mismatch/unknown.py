@@ -11,6 +11,7 @@ import numpy as np
 from scipy import signal
 
 from irb140_jax.mismatch.explain import Explanation, full_posterior
+from irb140_jax.mismatch.noise import spread
 from irb140_jax.mismatch.prove import HeldOut
 from irb140_jax.mismatch.rows import Stretch
 
@@ -156,7 +157,10 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
 def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
     """Only the level is divided out, not the colour: a slow structure is exactly what is looked for."""
     pick = [ex.noise.usable(s.use[:, j], j) for s in ex.data.stretches]
-    level = np.concatenate([np.full(p.sum(), ex.noise.total[r, j]) for r, p in enumerate(pick)])
+    level = np.concatenate([
+        ex.noise.total[r, j] * spread(s.unsure[p, j], ex.noise.total[r, j])
+        for r, (s, p) in enumerate(zip(ex.data.stretches, pick, strict=True))
+    ])  # fmt: skip
     recording = np.repeat(np.arange(len(pick)), [p.sum() for p in pick])
     y = np.concatenate([c[p, j] for c, p in zip(proof.corrected, pick, strict=True)]) / level
     if len(y):

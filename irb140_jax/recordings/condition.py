@@ -39,6 +39,7 @@ class Conditioned:
         usable: False where a joint rests (dry friction is undetermined there) or samples are missing, shape (T, n).
         rest_speed: Speed that encoder noise can't tell from rest, shape (n,).
         direction: sign(qd), and what stands for it near rest (see `direction_of`), shape (T, n).
+        unsure: Standard deviation of the low-passed torque that the samples leave open, shape (T, n): see `_between`.
         notes: Repairs, as sentences.
         began: Time of the log's first row [s]; the smoother leaves out the first samples.
     """
@@ -52,6 +53,7 @@ class Conditioned:
     usable: np.ndarray
     rest_speed: np.ndarray
     direction: np.ndarray
+    unsure: np.ndarray
     notes: tuple[str, ...]
     began: float = 0.0
 
@@ -159,6 +161,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     tau, spikes = _despiked(tau)
     h, h1, h2 = kernels(band.position, raw_rate)
     half = (len(h) - 1) // 2
+    unsure = _between(tau, band, raw_rate)
     anti_alias = kernels(min(0.4 * band.rate, 0.45 * raw_rate), raw_rate)[0]
     white = white_density(recording, raw_rate)
     q, speed_noise = without_noise(q, white, raw_rate, h1, resampled=t is not recording.t)
@@ -166,7 +169,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     tau = filtered(tau, anti_alias)
     keep = slice(None) if pad else slice(half, len(t) - half)
     grid = np.arange(t[keep][0], t[keep][-1] + 1e-9, 1.0 / band.rate)
-    q, qd, qdd, tau = (_at(grid, t, x) for x in (*smoothed, tau))
+    q, qd, qdd, tau, unsure = (_at(grid, t, x) for x in (*smoothed, tau, unsure))
     rest_speed = np.maximum(np.maximum(3.0 * speed_noise, 0.003 * np.abs(qd).max(axis=0, initial=0.0)), 1e-6)
     direction = direction_of(qd, rest_speed, band.rate)
     stuck = _at(grid, recording.t, _within_a_step(recording).astype(float))
@@ -178,7 +181,20 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     if spikes:
         notes.append(f"{spikes} torque spikes were replaced by the median of their neighbours")
     usable, began = ~resting & ~lost[:, None], float(recording.t[0])
-    return Conditioned(recording.source, grid, q, qd, qdd, tau, usable, rest_speed, direction, tuple(notes), began)
+    moving = (recording.source, grid, q, qd, qdd, tau, usable)
+    return Conditioned(*moving, rest_speed, direction, unsure, tuple(notes), began)
+
+
+def _between(tau: np.ndarray, band: Band, rate: float) -> np.ndarray:
+    """Standard deviation of the low-passed torque for steps that came between two samples, shape of tau.
+
+    A step may have come at any time between them: on average it is an impulse early or late, of its height times half
+    the time between samples, over the root of three.  Steps are what second differences see, and each of them
+    twice; what these always see is the sensor's noise.
+    """
+    bend = np.pad(np.diff(tau, 2, axis=0), ((1, 1), (0, 0)))
+    variance = filtered(bend**2 / 24.0, kernels(band.torque, rate)[0] ** 2)
+    return np.sqrt(np.maximum(variance - np.median(variance, axis=0), 0.0))
 
 
 def _held(slow: np.ndarray, rate: float) -> np.ndarray:
