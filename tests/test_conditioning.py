@@ -14,7 +14,7 @@ from irb140_jax.errors import InputError
 from irb140_jax.mismatch.model import CorrectedModel, Named, predict
 from irb140_jax.recordings.condition import choose_band, condition, conditioned
 from irb140_jax.recordings.direction import direction_of
-from irb140_jax.recordings.low_pass import Band
+from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 
 BAND = Band(torque=15.0, position=24.0, rate=200.0, step=5)
@@ -346,6 +346,30 @@ def test_a_joint_that_sticks_while_its_encoder_flickers_between_two_counts_is_at
     smooth = condition(logged(t, count * (np.round(moving / count) + flicker)), BAND)
     stuck = (smooth.t > 4.5) & (smooth.t < 7.5)
     assert not smooth.usable[stuck].any() and smooth.usable[(smooth.t > 0.5) & (smooth.t < 3.5)].mean() > 0.8
+
+
+def test_what_samples_leave_open_of_a_step_is_how_far_the_low_passed_torque_is_off():
+    fine, rng = 20000.0, np.random.default_rng(0)
+    taps, t = kernels(BAND.torque, RATE)[0], times(4.0)
+    rise = np.cumsum(kernels(BAND.torque, fine)[0])
+    after = (np.arange(len(rise)) - len(rise) // 2) / fine
+    off = []
+    for begins in 2.0 - rng.uniform(0.0, 1.0 / RATE, 200):
+        low_passed = filtered((t >= begins)[:, None].astype(float), taps)[:, 0]
+        off.append(low_passed - np.interp(t - begins, after, rise))
+    smooth = condition(logged(t, wave(t)[0], (t >= 2.0).astype(float)), BAND)
+    std = np.interp(smooth.t, t, np.sqrt(np.mean(np.square(off), axis=0)))
+    near = np.abs(smooth.t - 2.0) < 0.02  # the main lobe of the low-pass
+    np.testing.assert_allclose(smooth.unsure[near, 0], std[near], rtol=0.15)
+    assert smooth.unsure[np.abs(smooth.t - 2.0) > 0.5].max() < 0.01 * std.max()
+
+
+def test_samples_leave_nothing_open_of_a_smooth_torque_nor_much_of_a_noisy_one():
+    t, rng = times(), np.random.default_rng(0)
+    noise = rng.normal(size=len(t))
+    clean, noisy = (condition(logged(t, wave(t)[0], 10.0 * wave(t, 2.0)[0] + x), BAND) for x in (0.0, noise))
+    left = np.std(filtered(noise[:, None], kernels(BAND.torque, RATE)[0]))
+    assert clean.unsure.max() < 1e-3 and np.sqrt(np.mean(noisy.unsure**2)) < 0.3 * left
 
 
 def test_a_joint_that_creeps_is_at_rest_beside_recordings_in_which_it_moves():

@@ -1,5 +1,7 @@
 """Columns of every effect against the contract's equations, written down once more."""
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 from helpers_effects import a_shape, every_effect, motion, robot, some_values
 
 from irb140_jax.effects.backlash import STEPS, _flight
+from irb140_jax.effects.catalogue import CATALOGUE
 
 # The contract's equations written down once more: parameters, then qd, qdd, load and total torque of the site, (T, m).
 SIGN = {"sign": -1.0}
@@ -94,6 +97,10 @@ def flight(p, m, j):
 
 # Those that look at more than speed and load: of parameters, motion, joint; torque of it (T, 1) or of all (T, n).
 AT = lambda x, j: np.asarray(x)[:, j : j + 1]  # noqa: E731
+FOUR = (  # Gauss and Legendre's points and weights
+    (-0.8611363115940526, 0.3478548451374538), (-0.3399810435848563, 0.6521451548625461),
+    (0.3399810435848563, 0.6521451548625461), (0.8611363115940526, 0.3478548451374538),
+)  # fmt: skip
 LAWS_OF_MOTION = {
     "thermal_friction_drift": lambda p, m, j: AT(m.qd, j) * p["viscous_cold"] * (
         1 - p["relative_drop"] * (1 - np.exp(-np.asarray(m.t)[:, None] / p["time_constant"]))),
@@ -103,7 +110,8 @@ LAWS_OF_MOTION = {
     "torque_ripple": lambda p, m, j: p["amplitude"] * np.sin(2 * np.pi * p["cycles_per_rad"] * AT(m.q, j)),
     "actuator_lag": lambda p, m, j: p["time_constant"] * AT(m.scaled_rate, j),
     "time_delay": lambda p, m, j: p["delay"] * np.stack(
-        [np.interp(m.t + 0.5 * p["delay"], m.t, x) for x in np.asarray(m.asked_rate).T], axis=1),
+        [sum(0.5 * w * np.interp(m.t + 0.5 * (1.0 + u) * p["delay"], m.t, x) for u, w in FOUR)
+         for x in np.asarray(m.asked_rate).T], axis=1),
     "gravity_spring": lambda p, m, j: p["stiffness"] * (AT(m.q, j) - p["rest"]),
     "gravity_tilt": lambda p, m, j: p["tilt"] * float(m.rigid.gravity) * (m.rigid.by_gravity @ m.rigid.across[0]),
     "payload": lambda p, m, j: p["mass"] * np.asarray(m.rigid.held)[:, :, 0],
@@ -136,6 +144,18 @@ def test_columns_are_the_formula_of_the_contract(effect):
                 continue
             along = (np.asarray(x)[:, joints] for x in (m.qd, m.qdd, m.load, m.total))
             np.testing.assert_allclose(torque, LAWS[effect.slug](values, *along), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("delay", [0.003, 0.0185, -0.031])
+def test_a_delay_that_is_on_the_grid_is_right_up_to_the_highest_frequency(delay):
+    t, omega = np.arange(0.0, 2.0, 0.005), 2.0 * np.pi * 20.0
+    rate = jnp.asarray(omega * np.cos(omega * t))[:, None]
+    m = dataclasses.replace(motion(0), t=jnp.asarray(t), asked_rate=rate)
+    law = CATALOGUE["time_delay"]
+    w, shape = law.amplitudes({"delay": delay})
+    made = np.asarray(law.columns(m, jnp.arange(1), jnp.asarray(shape)))[:, 0, 0] * w[0]
+    inside = (t > 0.1) & (t < 1.9)  # rates are interpolated between samples: 3 % at 20 Hz
+    np.testing.assert_allclose(made[inside], (np.sin(omega * (t + delay)) - np.sin(omega * t))[inside], atol=0.09)
 
 
 @pytest.mark.parametrize("mass", [0.2, 3.0])

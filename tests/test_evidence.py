@@ -290,3 +290,15 @@ def test_columns_that_others_explain_to_the_last_digits_are_no_evidence_and_stop
         gain, _ = gains(H, [Layout(which, np.arange(6).reshape(-1, k))], len(which), k)
         assert not np.isnan(gain).any() and (gain < 1.0).all()
     assert np.abs(posterior(H, np.arange(6)).mean).max() < 1.0
+
+
+def test_noise_is_told_apart_from_what_some_rows_are_unsure_by():
+    rng = np.random.default_rng(0)
+    unsure = np.where(rng.random((4000, 1)) < 0.1, 5.0, 0.0)
+    residual = rng.normal(size=unsure.shape) + unsure * rng.normal(size=unsure.shape)
+    use = [np.ones(residual.shape, dtype=bool)]
+    noise, blind = (noise_from_residuals([residual], use, np.zeros(1), x) for x in ([unsure], None))
+    assert noise.total[0, 0] == pytest.approx(1.0, rel=0.05) and blind.total[0, 0] > 1.7
+    white = noise.whitened(residual[:, 0], 0, 0, unsure[:, 0])
+    loud = unsure[:, 0] > 0.0
+    assert np.std(white[loud]) == pytest.approx(np.std(white[~loud]), rel=0.1)

@@ -6,14 +6,15 @@ import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
 
-HALVES = tuple(0.004 * k for k in range(-4, 5))  # s: half of the delays that are tried; first order serves between them
+HALVES = tuple(0.001 * k for k in range(-16, 17))  # s: half of the delays that are tried first
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # on -1 to 1: slopes whose mean is that over the delay
 
 
 class TimeDelay(AbstractEffect):
     """q_logged(t) = q(t - delay): the logged torque belongs to a later motion, tau(t + delay).
 
-    tau(t + delay) - tau(t) is delay times the slope at t + delay/2, right to third order in frequency times delay; the
-    shape is where the slope is taken.
+    tau(t + delay) - tau(t) is delay times the mean slope from t to t + delay; the shape is half of the time over which
+    that is taken, and where that is not half the delay, it is right to first order.
     """
 
     slug = "time_delay"
@@ -38,13 +39,24 @@ class TimeDelay(AbstractEffect):
     def shapes(self, scales, joints):
         return np.array(HALVES)[:, None]
 
+    def refines(self):
+        return True
+
+    def finer(self, grid, best):
+        step = np.min(np.diff(np.sort(grid[:, 0])))
+        return best[0] + np.linspace(-step, step, len(grid))[:, None]
+
     def columns(self, motion, joints, shape):
-        late = jax.vmap(lambda x: jnp.interp(motion.t + shape[0], motion.t, x), in_axes=1, out_axes=1)
-        return late(motion.asked_rate)[:, :, None]
+        def mean_slope(x):
+            at = motion.t + shape[0] * (1.0 + NODES[:, None])
+            return 0.5 * WEIGHTS @ jnp.interp(at, motion.t, x)
+
+        return jax.vmap(mean_slope, in_axes=1, out_axes=1)(motion.asked_rate)[:, :, None]
 
     def passed_on(self, x, dt, w, shape):
         t, slope = dt * np.arange(len(x)), np.gradient(x, dt, axis=0)
-        return w[0] * np.stack([np.interp(t + shape[0], t, s) for s in slope.T], axis=1)
+        at = t + shape[0] * (1.0 + NODES[:, None])
+        return w[0] * np.stack([0.5 * WEIGHTS @ np.interp(at, t, s) for s in slope.T], axis=1)
 
     def physical(self, w, shape):
         return w

@@ -52,7 +52,10 @@ def _split(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _joined(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
-    """Put one effect that acts on several joints in the place of one kind on each of them, where it explains more."""
+    """Put one effect that acts on several joints in the place of one kind on each of them, where it explains more.
+
+    It may take the place of another such effect as well: a delay that is wrong is made up for by lags.
+    """
     everywhere = np.array([len(c.joints) > 1 for c in problem.candidates])
     kinds = defaultdict(list)
     for c in chosen:
@@ -61,11 +64,13 @@ def _joined(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
     for alike in kinds.values():
         if len(alike) < 2:
             continue
-        rest = tuple(c for c in chosen if c not in alike)
-        scores = np.where(everywhere & ~problem.beside.conflicts(rest), problem.scores(rest), -np.inf)
-        best = int(np.argmax(scores))
-        if scores[best] - ACCEPT > problem.odds(rest, alike) - len(alike) * ACCEPT:
-            return _settled(problem, (*rest, best))
+        for more in [(), *((c,) for c in chosen if everywhere[c])]:
+            old = (*alike, *more)
+            rest = tuple(c for c in chosen if c not in old)
+            scores = np.where(everywhere & ~problem.beside.conflicts(rest), problem.scores(rest), -np.inf)
+            best = int(np.argmax(scores))
+            if scores[best] - ACCEPT > problem.odds(rest, old) - len(old) * ACCEPT:
+                return _settled(problem, (*rest, best))
     return chosen
 
 

@@ -230,8 +230,8 @@ class Problem:
 
     @cached_property
     def _late(self) -> np.ndarray:
-        """Which candidates are in the log itself, out of time or of scale, shape (len(candidates),)."""
-        return np.array([c.effect.logged > 0 for c in self.candidates])
+        """Which candidates put the log out of time, shape (len(candidates),)."""
+        return np.array([c.effect.logged > 1 for c in self.candidates])
 
     @cached_property
     def imitated(self) -> np.ndarray:
