@@ -1,6 +1,7 @@
 """Arms, loops and physics that share nothing with this library: MJCF written by hand, laws of MuJoCo itself.
 
     python experiments/arms_by_hand.py                    # cases 0 to 71, one or two effects, clean logs
+    python experiments/arms_by_hand.py abrupt             # cases 0 to 71, motions that start and stop at once
     python experiments/arms_by_hand.py rough              # cases 0 to 47, friction everywhere and one more, rough logs
     python experiments/arms_by_hand.py parts              # cases 0 to 53, second joints, tendons, walls ..., clean logs
     python experiments/arms_by_hand.py rough_parts        # the same beneath friction everywhere, rough logs
@@ -28,7 +29,21 @@ import mujoco
 import numpy as np
 import tyro
 from arms_by_hand_report import key, read, say, without, write
-from hand_arms import ARMS, MOTIONS, Plant, Sizes, clean, compiled, plant_of, recorded, rough, sizes_of, tree_of, wrong
+from hand_arms import (
+    ARMS,
+    MOTIONS,
+    Plant,
+    Sizes,
+    abrupt,
+    clean,
+    compiled,
+    plant_of,
+    recorded,
+    rough,
+    sizes_of,
+    tree_of,
+    wrong,
+)
 from hand_laws import BENEATH_ONLY, EVERYWHERE, INSTEAD_OF, LAWS, ORDINARY
 from hand_parts import PARTS, add_tool
 
@@ -40,11 +55,16 @@ from irb140_jax.robot import Robot, robot_from_model
 
 def case(seed: int) -> tuple[str, Robot, list[Recording], list[dict]]:
     """An arm, its nominal model, two clean recordings, and what is hidden in them: every sixth round hides nothing."""
-    rng = np.random.default_rng([seed, 140])
+    return clean_case(seed, clean, 140)
+
+
+def clean_case(seed: int, logger: Callable, stream: int) -> tuple[str, Robot, list[Recording], list[dict]]:
+    """Such a case, of a logger and the motions that go with it."""
+    rng = np.random.default_rng([seed, stream])
     arm = list(ARMS)[seed % len(ARMS)]
     count = 0 if (seed // len(ARMS)) % 6 == 5 else int(rng.choice([1, 1, 2]))
     clean_laws = [slug for slug in LAWS if slug not in BENEATH_ONLY]
-    return arm, *hidden(arm, [str(slug) for slug in rng.choice(clean_laws, count, replace=False)], clean, rng)
+    return arm, *hidden(arm, [str(slug) for slug in rng.choice(clean_laws, count, replace=False)], logger, rng)
 
 
 def rough_case(seed: int) -> tuple[str, Robot, list[Recording], list[dict]]:
@@ -123,18 +143,18 @@ def hide(
 class Config:
     """Which cases."""
 
-    kind: tyro.conf.Positional[Literal["clean", "rough", "parts", "rough_parts"]] = "clean"
+    kind: tyro.conf.Positional[Literal["clean", "abrupt", "rough", "parts", "rough_parts"]] = "clean"
     first: int = 0
     last: int | None = None
-    """The last seed; 71 of the clean ones, 47 of the rough ones, 53 of either with parts."""
+    """The last seed; 71 of the clean and the abrupt ones, 47 of the rough ones, 53 of either with parts."""
     out: pathlib.Path = pathlib.Path("results")
     table: bool = False
     """Only write the page from the results that are there."""
 
 
 KINDS = {
-    "clean": (case, 71), "rough": (rough_case, 47), "parts": (parts_case, 53),
-    "rough_parts": (partial(parts_case, logger=rough), 53),
+    "clean": (case, 71), "abrupt": (partial(clean_case, logger=abrupt, stream=143), 71), "rough": (rough_case, 47),
+    "parts": (parts_case, 53), "rough_parts": (partial(parts_case, logger=rough), 53),
 }  # fmt: skip
 
 

@@ -20,6 +20,11 @@ vertical slide, or a gain where nothing but inertia acts, can't be seen by anyon
 
 ## One or two laws, a clean log
 """
+OPENING_ABRUPT = """## One or two laws, motions that start and stop at once
+
+The same, along moves from pose to pose at constant speed, which is reached at a constant acceleration in 0.1 to 0.3 s:
+torque steps, and a log of 500 Hz does not tell when between two samples.
+"""
 OPENING_ROUGH = """## Friction on every joint, a rough log, and one more law beneath
 
 The same arms with MuJoCo's `frictionloss` (15 % of the joint's torque, give or take 40 %) and `damping` (10 %) on every
@@ -137,7 +142,10 @@ def read(path: pathlib.Path) -> list[dict]:
 def write(paths: dict[str, pathlib.Path]) -> None:
     """docs/arms-by-hand.md from the files of each kind that are there."""
     lines = []
-    openings = {"clean": OPENING, "rough": OPENING_ROUGH, "parts": OPENING_PARTS, "rough_parts": OPENING_ROUGH_PARTS}
+    openings = {
+        "clean": OPENING, "abrupt": OPENING_ABRUPT, "rough": OPENING_ROUGH, "parts": OPENING_PARTS,
+        "rough_parts": OPENING_ROUGH_PARTS,
+    }  # fmt: skip
     for kind, opening in openings.items():
         if cases := read(paths[kind]):
             lines += [opening, *table(cases, ORDINARY if "rough" in kind else (), by_law="parts" in kind)]

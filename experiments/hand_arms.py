@@ -166,11 +166,39 @@ def point_to_point(model: mujoco.MjModel, rng: np.random.Generator) -> Callable:
     return motion
 
 
+def trapezoids(model: mujoco.MjModel, rng: np.random.Generator) -> Callable:
+    """Motion t -> (q, qd, qdd): from pose to pose in 0.5 to 1.7 s at constant speed, reached in 0.1 to 0.3 s at once.
+
+    The acceleration steps four times a move, as drives with trapezoids of speed make it; 0.3 s of rest at each pose.
+    """
+    low, high = model.jnt_range.T
+    poses = (low + high) / 2.0 + rng.uniform(-0.35, 0.35, (60, model.nv)) * (high - low)
+    ends, rises = np.cumsum(rng.uniform(0.8, 2.0, 60)), rng.uniform(0.1, 0.3, 60)
+
+    def motion(t):
+        i = int(np.searchsorted(ends, t))
+        began = ends[i - 1] if i else 0.0
+        T, step, now = ends[i] - began - 0.3, poses[i + 1] - poses[i], t - began
+        rise = min(rises[i], 0.45 * T)
+        bend = ((now < rise) - float(T - rise <= now < T)) / rise
+        speed = np.clip(min(now, T - now) / rise, 0.0, 1.0)
+        ramp = lambda s: 0.5 * np.clip(s, 0.0, rise) ** 2 / rise + max(s - rise, 0.0)  # noqa: E731
+        way = ramp(now) - ramp(now - T + rise)
+        return poses[i] + step * way / (T - rise), step * speed / (T - rise), step * bend / (T - rise)
+
+    return motion
+
+
 def clean(t, q, tau, slide, rng):
     """What a good logger keeps: every 2 ms, positions with 1e-5 of noise, torques with 1 % of their RMS."""
     t, q, tau = t[::EVERY], q[::EVERY], tau[::EVERY]
     tau = tau + 0.01 * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)
     return t, q + 1e-5 * rng.normal(size=q.shape), tau
+
+
+def abrupt(t, q, tau, slide, rng):
+    """The same logger, of motions that start and stop at once."""
+    return clean(t, q, tau, slide, rng)
 
 
 def rough(t, q, tau, slide, rng):
@@ -224,8 +252,8 @@ def untouched(t, q, tau, slide, rng):
     return t, q, tau
 
 
-SECONDS = {clean: 15.0, rough: 20.0, untouched: 15.0}
-MOTIONS = {clean: (sines, sines), rough: (sines, point_to_point, slow_sines)}
+SECONDS = {clean: 15.0, abrupt: 15.0, rough: 20.0, untouched: 15.0}
+MOTIONS = {clean: (sines, sines), abrupt: (trapezoids, trapezoids), rough: (sines, point_to_point, slow_sines)}
 
 
 def sizes_of(model: mujoco.MjModel) -> Sizes:
