@@ -47,6 +47,7 @@ def servo(result: dict) -> list[str]:
         f"| {r['copies']} | {', '.join(f'{x:.4f}' for x in sorted(r['errors_judged']))} |"
         for r in result["other_draws"]
     ]
+    met = sum(x <= result["goal"] for r in result["other_draws"] for x in r["errors_judged"])
     judged = [optima[0]["error_judged"] for optima in result["simulation"].values()]
     free = result["simulation"]["with load-dependent friction, as named"][0]["numbers"]
     told = next(f for f in result["findings"] if f["effect"] == "load_dependent_friction")["parameters"]
@@ -77,7 +78,8 @@ def servo(result: dict) -> list[str]:
         "Other scatters, freely refitted, the best optimum. That width was settled when judged figures of others were",
         "known; one gain of three left out at a time would prefer more scatter, but tells little between any of them:",
         "", "| scatter of the numbers | error on the gain left out | runs judged |", "|---|---|---|", *tried, "",
-        "Copies drawn anew, refitted freely from the data sheet, runs judged:", "",
+        f"Copies drawn anew, refitted freely from the data sheet, runs judged. The goal is met by {met} of these"
+        f" {sum(len(r['errors_judged']) for r in result['other_draws'])} draws:", "",
         "| copies | every draw |", "|---|---|", *drawn,
     ]  # fmt: skip
 

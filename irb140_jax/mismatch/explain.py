@@ -23,6 +23,7 @@ from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
+WEIGHTLESS = 0.43  # standard deviations of a payload's mass: with less, the odds that there is any are below two to one
 PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both
 
 
@@ -114,7 +115,7 @@ def explain(
         loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
         (lib, chosen), noise = _refined(ex), ex.noise
         del ex  # hundreds of megabytes, before the next
-    return explained(PASSES, BLOCKS)
+    return _of_some_weight(explained(PASSES, BLOCKS))
 
 
 def _settled(
@@ -133,6 +134,20 @@ def _settled(
         del prob, g  # hundreds of megabytes, before the next are made
     prob, g = problem(data, noise, blocks, settled=settled)
     return Explanation(lib, scales, data, noise, prob, g, search(prob, chosen), factor)
+
+
+def _of_some_weight(ex: Explanation) -> Explanation:
+    """The explanation without what should have a mass and has none, and with what is then found: see `WEIGHTLESS`."""
+    post, at, weightless = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), ex.data.nuisances, set()
+    for c in ex.members:
+        if c.effect.tied and post.mean[at] < WEIGHTLESS * np.sqrt(post.cov[at, at]):
+            weightless.add((c.slug, c.joints))
+        at += len(c.columns)
+    if not weightless:
+        return ex
+    none = np.array([(c.slug, c.joints) in weightless for c in ex.data.candidates])
+    prob = dataclasses.replace(ex.problem, lowest=np.where(none[:, None], np.inf, ex.problem.lowest))
+    return dataclasses.replace(ex, problem=prob, chosen=search(prob, tuple(i for i in ex.chosen if not none[i])))
 
 
 def withdrawn(ex: Explanation, names: Collection[int]) -> Explanation:
