@@ -196,6 +196,17 @@ class AbstractEffect(abc.ABC):
         """As many grid points as before, around the best one (by default one parameter; see `between_neighbours`)."""
         return between_neighbours(grid, best)
 
+    def peak(self, grid: np.ndarray, best: np.ndarray, odds: np.ndarray) -> np.ndarray:
+        """Where between its points a grid is at its best, about which `finer` makes the next; by default the point.
+
+        Args:
+            grid: Shape (points, shape parameters).
+            best: Its best point, shape (shape parameters,).
+            odds: Log odds of each point beside the rest of the explanation, -inf where it is inadmissible, (points,).
+        """
+        del grid, odds
+        return best
+
     def scan(self, scales: Scales, joints: np.ndarray) -> np.ndarray:
         """Many shapes to try one by one before the search, shape (points, shape parameters); none by default.
 

@@ -53,6 +53,14 @@ class Contact(AbstractEffect):
     def refines(self):
         return True
 
+    def peak(self, grid, best, odds):
+        # Turns and shift about the place of contact hardly mix: the top of a parabola through each three points.
+        if not np.all(np.isfinite(odds)) or np.any(grid[0] != best):
+            return best
+        moved = sum(_top(odds[0], odds[i], odds[i + 1]) * 0.5 * (grid[i + 1] - grid[i]) for i in (1, 3))
+        top = best + moved + _top(odds[0], odds[6], odds[5]) * (grid[5] - best)
+        return np.append(top[:3] / np.linalg.norm(top[:3]), top[3])
+
     def finer(self, grid, best):
         turns, shift = 0.5 * (grid[2:5:2] - grid[1:4:2]), 0.5 * (grid[5, 3] - grid[6, 3])
         tilts = np.linalg.norm(turns[:, :3], axis=1)
@@ -126,6 +134,12 @@ def _around(best, turns, tilt, shift):
     turned = np.array([best + tilt * s * turn for turn in turns for s in (-1.0, 1.0)])
     turned[:, :3] /= np.linalg.norm(turned[:, :3], axis=1, keepdims=True)
     return np.array([best, *turned, best + [0, 0, 0, shift], best - [0, 0, 0, shift]])
+
+
+def _top(middle, low, high):
+    """Where the parabola through values at -1, 0 and 1 is highest, between -1 and 1; 0 where it is flat."""
+    bend = 2.0 * middle - low - high
+    return float(np.clip(0.5 * (high - low) / bend, -1.0, 1.0)) if bend > 0.0 else 0.0
 
 
 def _wall(tool, tool_jacobian, shape, xp):

@@ -219,12 +219,20 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
         for s, joints in enumerate(sites):
             mine = [m for m in ex.members if m.slug == effect.slug and m.joints == tuple(joints)]
             if mine and effect.refines():
-                new[s] = effect.finer(old[s], mine[0].shape)
+                new[s] = effect.finer(old[s], _peak(ex, mine[0], old[s]))
             elif effect.scouts and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)
     refined = reshaped(ex.lib, shapes)
     return refined, tuple(_same(c, refined, ex.data) for c in ex.chosen)
+
+
+def _peak(ex: Explanation, mine: Candidate, grid: np.ndarray) -> np.ndarray:
+    """Where a member's grid is at its best beside the other members, to a fraction of its steps."""
+    candidates, site = ex.data.candidates, (mine.slug, mine.joints, mine.variant)
+    same = [i for i, c in enumerate(candidates) if (c.slug, c.joints, c.variant) == site]
+    odds = ex.problem.scores(tuple(c for c in ex.chosen if c not in same))[same]
+    return mine.effect.peak(grid, mine.shape, odds)
 
 
 def _same(index: int, lib: Library, data: Data) -> int:

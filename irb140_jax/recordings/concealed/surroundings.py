@@ -133,6 +133,9 @@ class _AtTool(Hidden):
         self._body, self._place = tool_in_body(plant.model)
 
     def act(self, plant: Plant):
+        # The engine's step moves the joints last: its bodies still stand where they stood before it.
+        mujoco.mj_kinematics(plant.model, plant.data)
+        mujoco.mj_comPos(plant.model, plant.data)
         push(plant.model, plant.data, self._body, self._place,
              lambda p: self.force(plant.t, plant.recording, p), plant.inner)
 
