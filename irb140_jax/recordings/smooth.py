@@ -1,7 +1,7 @@
 """The noise of logged positions, and Wiener's smoother that takes it out before they are differentiated."""
 
 import numpy as np
-from scipy import ndimage, signal
+from scipy import ndimage, signal, special
 from scipy.signal import windows
 
 from irb140_jax.recordings.recording import Recording
@@ -11,7 +11,10 @@ ROUNDS = 4  # in which that is smoothed; ten are better by a tenth
 QUARTIC = 4  # the polynomial that tells the acceleration at an end ...
 ENDS = 0.5  # ... from so many periods of the highest frequency in the motion ...
 SHORTEST, LONGEST = 0.1, 1.0  # ... but not less, nor more [s]
-CERTAIN = 1.5  # times the noise that a spectrum must exceed before any of it counts as signal: its own scatter
+WINDOW = 4.0  # [s] of the spectrum's windows
+CERTAIN = 1.3  # times the noise that a spectrum must exceed before any of it counts as signal: its own scatter
+BINS = 5  # of the spectrum that are averaged; with Kaiser's window they have as many degrees of freedom in one window
+CHANCE = 1e-7  # with which noise alone is as high as the top of a run of frequencies that counts as signal
 
 
 def without_noise(
@@ -86,15 +89,25 @@ def _acceleration(x: np.ndarray, rate: float) -> float:
 def _signal_share(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, float, np.ndarray]:
     """Share of the signal in a position's power at each frequency, density of its white noise, frequencies [Hz]."""
     f, p, floor = spectrum_of(x, density, rate)
-    smooth = ndimage.uniform_filter1d(p, 5, mode="nearest")
-    share = np.clip(1.0 - CERTAIN * floor / np.maximum(smooth, 1e-300), 0.0, 1.0)
+    smooth = np.maximum(ndimage.uniform_filter1d(p, BINS, mode="nearest"), 1e-300)
+    share = np.clip(1.0 - CERTAIN * floor / smooth, 0.0, 1.0)
     share[f < 1.0] = 1.0  # below, windows of four seconds can't tell
-    return share, floor, f
+    # Of hundreds of frequencies some stand out by chance; differentiated twice, those would be what is loudest.
+    freedom = BINS * max(2 * len(x) // _window(x, rate) - 1, 1)
+    runs, count = ndimage.label(share > 0.0)
+    top = ndimage.maximum(np.where(f < 1.0, np.inf, smooth), runs, np.arange(count + 1))
+    sure = top > floor * special.chdtri(freedom, CHANCE) / freedom
+    return np.where(sure[runs], share, 0.0), floor, f
+
+
+def _window(x: np.ndarray, rate: float) -> int:
+    """Samples of a window of the spectrum."""
+    return min(len(x), int(WINDOW * rate))
 
 
 def spectrum_of(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Frequencies [Hz], power density of a position, and that of its white noise: as known, or as seen at the top."""
-    window = windows.kaiser(min(len(x), int(4 * rate)), 14.0)
+    window = windows.kaiser(_window(x, rate), 14.0)
     f, p = signal.welch(x, rate, window=window, detrend="linear")
     return f, p, max(float(np.median(p[f > 0.6 * f[-1]])), density)
 
