@@ -16,7 +16,7 @@ SCALES = Scales(
     speed=np.array([0.4, 2.0, 0.5, 3.0]), rest_speed=np.array([1e-3, 2e-3, 1e-3, 1e-2]),
     torque=np.array([50.0, 9.0, 20.0, 1.0]), duration=20.0,
     low=np.array([-0.3, -2.0, -0.2, -1.0]), high=np.array([0.4, 1.0, 0.5, 2.0]),
-    inertia=np.array([20.0, 1.0, 3.0, 0.1]),
+    inertia=np.array([20.0, 1.0, 3.0, 0.1]), q_noise=np.full(4, 1e-5),
 )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ CONTACT = CATALOGUE["contact"]
 ACROSS = np.array([0.6, 0.0, 0.8])  # the arm moves in the plane across it
 STIFFNESS = 800.0
 NONE = np.zeros(2)
-SCALES = Scales(NONE, NONE, NONE, NONE, NONE, 9.0, NONE)  # a wall asks for none of them
+SCALES = Scales(NONE, NONE, NONE, NONE, NONE, 9.0, NONE, NONE)  # a wall asks for none of them
 
 
 def path(seed: int, rows: int = 900) -> tuple[np.ndarray, np.ndarray]:

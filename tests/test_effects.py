@@ -137,7 +137,7 @@ def test_shape_grids_are_equally_long_at_every_site_and_without_repetition(effec
 def test_shape_grids_stand_for_a_joint_that_never_moves(effect):
     none = np.zeros(len(KINDS))
     still = Scales(none, np.full(len(KINDS), 1e-6), np.full(len(KINDS), 1e-12), none, none, 0.0,
-                   np.full(len(KINDS), 1e-12))
+                   np.full(len(KINDS), 1e-12), none)
     for joints in effect.sites(robot()):
         columns = jax.vmap(effect.columns, (None, None, 0))
         assert np.isfinite(columns(motion(), jnp.asarray(joints), jnp.asarray(effect.shapes(still, joints)))).all()

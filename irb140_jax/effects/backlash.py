@@ -9,6 +9,7 @@ from jax import lax
 from irb140_jax.effects.base import ALIKE, AbstractEffect, Parameter
 
 CROSSINGS = (0.03, 0.3)  # s the link takes through the dead zone: less is not seen below 20 Hz, more is no gear
+NOISES = 10.0  # of the encoder in the least gap that is looked for: a few of them take its noise from the torque
 RATIO = 1.12  # of neighbouring gaps in the first scan: a tenth more and the link hits the flank too late
 POINTS = 4  # gaps in the search, each with two flanks
 FLANKS = (0.5, 2.0)  # in the first grid, over that of the scan
@@ -71,6 +72,7 @@ class Backlash(AbstractEffect):
         # A link without inertia follows at once: then the way that the motor goes is the limit.
         largest = max(min(0.5 * torque / inertia * CROSSINGS[1] ** 3, high - low), 1e-12)
         gaps = largest * np.geomspace((CROSSINGS[0] / CROSSINGS[1]) ** 3, 1.0, self.scanned)
+        gaps = np.maximum(gaps, NOISES * float(scales.q_noise[joints[0]]))
         flanks = np.maximum(inertia * (2.0 * np.pi * MODE) ** 2, torque / (LEAST_GIVE * gaps))
         return np.stack([gaps, flanks, np.full(self.scanned, FLANK_DAMPING)], axis=1)
 

@@ -92,6 +92,7 @@ class Scales(NamedTuple):
     high: np.ndarray
     duration: float  # of the longest recording [s]
     inertia: np.ndarray  # mean inertia of the links about each joint, without rotors [kg m^2 or kg]
+    q_noise: np.ndarray  # standard deviation of the encoders' white noise [rad or m]
 
 
 class Parameter(NamedTuple):

@@ -38,6 +38,7 @@ def scales_of(along: Sequence["Prepared"]) -> Scales:
         high=np.max([r.q.max(axis=0) for r in recordings], axis=0),
         duration=max(float(r.t[-1] - r.t[0]) for r in recordings),
         inertia=np.maximum(inertia, 1e-12),
+        q_noise=np.max([r.q_noise for r in recordings], axis=0),
     )
 
 

@@ -99,7 +99,7 @@ def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
     usable = ~ndimage.maximum_filter1d(rounded.astype(np.uint8), around, axis=0).astype(bool)
     direction, torque = np.tanh(motion.qd / rest_speed), np.zeros_like(motion.q)
     moving = (motion.name, motion.t, motion.q, motion.qd, motion.qdd, torque, usable)
-    return Conditioned(*moving, rest_speed, direction, np.zeros_like(motion.q), ())
+    return Conditioned(*moving, rest_speed, np.zeros_like(rest_speed), direction, np.zeros_like(motion.q), ())
 
 
 def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, int]]:

@@ -38,6 +38,7 @@ class Conditioned:
         tau: Logged torque without spikes, anti-aliased to the grid [N m or N], shape (T, n).
         usable: False where a joint rests (dry friction is undetermined there) or samples are missing, shape (T, n).
         rest_speed: Speed that encoder noise can't tell from rest, shape (n,).
+        q_noise: Standard deviation of the logged positions' white noise [rad or m], shape (n,).
         direction: sign(qd), and what stands for it near rest (see `direction_of`), shape (T, n).
         unsure: Standard deviation of the low-passed torque that the samples leave open, shape (T, n): see `_between`.
         notes: Repairs, as sentences.
@@ -52,6 +53,7 @@ class Conditioned:
     tau: np.ndarray
     usable: np.ndarray
     rest_speed: np.ndarray
+    q_noise: np.ndarray
     direction: np.ndarray
     unsure: np.ndarray
     notes: tuple[str, ...]
@@ -182,7 +184,8 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
         notes.append(f"{spikes} torque spikes were replaced by the median of their neighbours")
     usable, began = ~resting & ~lost[:, None], float(recording.t[0])
     moving = (recording.source, grid, q, qd, qdd, tau, usable)
-    return Conditioned(*moving, rest_speed, direction, unsure, tuple(notes), began)
+    q_noise = np.sqrt(0.5 * raw_rate * white)
+    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began)
 
 
 def _between(tau: np.ndarray, band: Band, rate: float) -> np.ndarray:
