@@ -197,6 +197,10 @@ class AbstractEffect(abc.ABC):
         """As many grid points as before, around the best one (by default one parameter; see `between_neighbours`)."""
         return between_neighbours(grid, best)
 
+    def during(self, shape: np.ndarray) -> tuple[int, float, float]:
+        """Index of the recording in which what happens `once` happens, from when and until when [s]."""
+        raise NotImplementedError(f"{self.slug} doesn't happen once")
+
     def peak(self, grid: np.ndarray, best: np.ndarray, odds: np.ndarray) -> np.ndarray:
         """Where between its points a grid is at its best, about which `finer` makes the next; by default the point.
 

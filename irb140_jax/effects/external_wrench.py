@@ -73,6 +73,9 @@ class ExternalWrench(AbstractEffect):
         at[:, 1] = np.maximum(at[:, 1], at[:, 0] + SHORTEST)
         return at
 
+    def during(self, shape):
+        return round(float(shape[2])) - 1, float(shape[0]), float(shape[1])
+
     def scout(self, left, scales, joints):
         best, gain, left = None, -np.inf, left.every(THIN)
         for recording in np.unique(left.recording):

@@ -19,6 +19,7 @@ LOOSE_PRIOR = np.log(0.2)  # such a link is rarer than a left-out effect
 LAST_PRIOR = -10.0 * np.log(3.0)
 FEWEST_ROWS = 40  # of a joint: any explanation fits fewer, and what is left of them is no measure of noise
 ROUNDING = 1e-9  # of a joint's torque: a column that moves less moves nothing
+EVENT = 0.2  # s before what happens once, or after it, that must be recorded
 BLOCKS = 5  # contiguous blocks per recording: for jackknife intervals, and folds where there is one recording
 
 
@@ -111,7 +112,7 @@ def problem(data: Data, noise: Noise, blocks: int = BLOCKS, *, settled: bool = T
     for i, c in enumerate(data.candidates):
         s = data.scale[data.nuisances + c.columns]
         # What is there only if it is more than nothing, but moves nothing here, can't be found.
-        unseen = (s == 0.0) & (c.lowest == 0.0)
+        unseen = (s == 0.0) & (c.lowest == 0.0) | (c.effect.once and _throughout(data, c))
         own = settled & np.isin(c.variant, c.effect.own)
         at_least = np.where(own, np.maximum(c.lowest, c.effect.settled), c.lowest)
         lowest[i, : len(c.columns)] = np.where(unseen, np.inf, at_least / np.where(s > 0, s, 1.0))
@@ -126,6 +127,14 @@ def problem(data: Data, noise: Noise, blocks: int = BLOCKS, *, settled: bool = T
     offset = data.nuisances
     entry = rare - log_prior
     return Problem(H, g.per_joint, energy, data.candidates, offset, log_prior, entry, lowest, highest, summed, least), g
+
+
+def _throughout(data: Data, c: Candidate) -> bool:
+    """Whether what should happen once neither begins nor ends while it is recorded."""
+    recording, begins, ends = c.effect.during(c.shape)
+    seen = [s.t[np.any(s.use, axis=1)] - s.begin for s in data.stretches if s.recording == recording]
+    t = np.concatenate([*seen, np.zeros(0)])
+    return len(t) == 0 or (begins < t[0] + EVENT and ends > t[-1] - EVENT)
 
 
 def first_noise(data: Data) -> Noise:
