@@ -54,7 +54,8 @@ def _split(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
 def _joined(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
     """Put one effect that acts on several joints in the place of one kind on each of them, where it explains more.
 
-    It may take the place of another such effect as well: a delay that is wrong is made up for by lags.
+    It may take the place of another such effect as well: a delay that is wrong is made up for by lags.  And it may take
+    from each only what goes beyond a special case: a lean of the base makes friction seem asymmetric everywhere.
     """
     everywhere = np.array([len(c.joints) > 1 for c in problem.candidates])
     kinds = defaultdict(list)
@@ -67,11 +68,23 @@ def _joined(problem: Problem, chosen: tuple[int, ...]) -> tuple[int, ...]:
         for more in [(), *((c,) for c in chosen if everywhere[c])]:
             old = (*alike, *more)
             rest = tuple(c for c in chosen if c not in old)
-            scores = np.where(everywhere & ~problem.beside.conflicts(rest), problem.scores(rest), -np.inf)
-            best = int(np.argmax(scores))
-            if scores[best] - ACCEPT > problem.odds(rest, old) - len(old) * ACCEPT:
-                return _settled(problem, (*rest, best))
+            already = problem.odds(rest, old) - len(old) * ACCEPT
+            for kept in {(), _special(problem, rest, alike)}:
+                others = (*rest, *kept)
+                scores = np.where(everywhere & ~problem.beside.conflicts(others), problem.scores(others), -np.inf)
+                best = int(np.argmax(scores))
+                if problem.odds(rest, kept) + scores[best] - (len(kept) + 1) * ACCEPT > already:
+                    return _settled(problem, (*others, best))
     return chosen
+
+
+def _special(problem: Problem, rest: tuple[int, ...], alike: list[int]) -> tuple[int, ...]:
+    """The best special case of each of some members, beside others."""
+    best = []
+    for d in alike:
+        options = [o for o in possible_beside(problem, rest, simpler(problem, d, ordinary=False)) if o[0] not in rest]
+        best += [max(options, key=lambda o: problem.odds(rest, o))] if options else []
+    return tuple(i for option in best for i in option)
 
 
 def _grown(problem: Problem, chosen: tuple[int, ...], banned: frozenset[int] = frozenset()) -> tuple[int, ...]:
@@ -178,18 +191,18 @@ def _simplify(problem: Problem, chosen: tuple[int, ...], near: tuple[int, ...]) 
     return None
 
 
-def simpler(problem: Problem, d: int) -> list[tuple[int, ...]]:
-    """What could stand for a law: its special cases, or ordinary friction, no more of it."""
+def simpler(problem: Problem, d: int, *, ordinary: bool = True) -> list[tuple[int, ...]]:
+    """What could stand for a law: its special cases, or (unless not asked for) ordinary friction, no more of it."""
     member = problem.candidates[d]
     if member.effect.ordinary:
         return []
     at_site = [(i, c) for i, c in enumerate(problem.candidates) if c.joints == member.joints]
     special: list[tuple[int, ...]] = [(i,) for i, c in at_site if c.slug in member.effect.contains]
-    if not member.effect.friction:
+    if not (member.effect.friction and ordinary):
         return special
-    ordinary = tuple(i for i, c in at_site if c.effect.ordinary)
-    one = [(i,) for i in ordinary if (i,) not in special]
-    return [*special, *one, *([ordinary] if 1 < len(ordinary) <= _size(member) else [])]
+    usual = tuple(i for i, c in at_site if c.effect.ordinary)
+    one = [(i,) for i in usual if (i,) not in special]
+    return [*special, *one, *([usual] if 1 < len(usual) <= _size(member) else [])]
 
 
 def _size(c: Candidate) -> int:
