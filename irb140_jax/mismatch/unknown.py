@@ -18,7 +18,7 @@ from irb140_jax.mismatch.rows import Stretch
 FEATURES = 60  # random Fourier features a competitor
 SHIFTS = 99  # circular time shifts that make the null
 MATERIAL_SHARE = 0.05  # of the remaining residual's variance; less is not worth a person's time
-MATERIAL_TORQUE = 0.02  # of the joint's torque RMS; below, what smoothing and imperfect laws leave
+MATERIAL_TORQUE = 0.015  # of the joint's torque RMS; below, what smoothing and imperfect laws leave
 SIGNIFICANT = 0.01
 SEED = 20260
 SLOWEST, FASTEST = 0.3, 8.0  # Hz: oscillators that the competitor with a memory may hold
@@ -28,7 +28,7 @@ MOTION_BLOCK = 2.5  # s left out together
 RIDGES = (0.001, 0.03, 1.0)  # of the features' variance; the best one counts, in the null as well
 TIME_BAND = 1.0  # Hz up to which the competitor of time follows
 TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
-BELITTLED = 0.2  # size of a nameless structure, over that of a finding, from which the finding may be a part of it ...
+BELITTLED = 0.16  # size of a nameless structure, over that of a finding, from which the finding may be a part of it ...
 NO_WORSE = 0.2  # ... if its competitor errs by at most so much more without the finding, times that ratio
 BETTER = 0.95  # and without any finding: where it distorts what is simple without it
 SAME = 0.9  # of a rarer finding's variance, from which the structure's variables are the finding's own
