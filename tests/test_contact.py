@@ -7,7 +7,7 @@ import pytest
 
 from irb140_jax.effects import Scales
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.effects.contact import _wall
+from irb140_jax.effects.contact import _around, _gain, _wall
 from irb140_jax.effects.left_over import LeftOver
 
 CONTACT = CATALOGUE["contact"]
@@ -101,3 +101,17 @@ def test_forces_that_are_alike_move_no_joint_otherwise_and_only_where_there_are_
     np.testing.assert_allclose(left.tool_jacobian @ (forces[0] - force), 0.0, atol=1e-9)
     turned = dataclasses.replace(left, tool_jacobian=left.tool_jacobian + np.outer(np.sin(left.t), ACROSS)[:, None])
     assert push.alike(turned, force, shape).shape == (0, 7)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_top_of_a_grid_is_nearer_to_the_wall_than_its_points(seed):
+    left, wall = left_over(seed, np.array([0.0, 1.0, 0.0]))
+    turn, shift = np.array([[1.0, 0.0, 0.0, left.tool[:, 0].mean()], np.zeros(4)]), 2e-3
+    off = wall + 2e-3 * turn[0] + [0.0, 0.0, 0.0, 1e-3]
+    off[:3] /= np.linalg.norm(off[:3])
+    grid = _around(off, turn, 5e-3, shift)
+    odds = np.array([_gain(left, point[None])[0] for point in grid])
+    top = CONTACT.peak(grid, grid[0], odds)
+    assert _gain(left, top[None])[0] > odds.max()
+    inadmissible = np.where(np.arange(len(grid)) == 5, -np.inf, odds)
+    np.testing.assert_array_equal(CONTACT.peak(grid, grid[0], inadmissible), grid[0])

@@ -75,3 +75,15 @@ def test_rules_that_undo_each_other_end_at_once(monkeypatch):
     monkeypatch.setattr(name, "_exchange", swaps)
     assert name._settled(problem([SPRING, GAIN], WAVE[None]), (0,)) == (0,)
     assert len(asked) == 2
+
+
+@pytest.mark.parametrize("lean, left", [(1.0, {2, 3, 4}), (-1.0, {0, 1})])
+def test_a_lean_of_the_base_takes_from_friction_on_each_joint_what_it_feigns(lean, left):
+    rng, none = np.random.default_rng(3), np.zeros(ROWS)
+    off = 0.05 * rng.normal(size=(2, ROWS))  # the laws are not quite what the lean is
+    bent = [TURNS + 0.2 * WAVE, TURNS + 0.2 * lean * WAVE]
+    torques = [bent[0] + off[0], none], [none, bent[1] + off[1]]
+    laws = [("stribeck_friction", (j,), torque) for j, torque in enumerate(torques)]
+    coulomb = [("coulomb_friction", (0,), [TURNS, none]), ("coulomb_friction", (1,), [none, TURNS])]
+    there = problem([*laws, *coulomb, ("gravity_tilt", (0, 1), [WAVE, WAVE])], 50.0 * np.stack(bent), shapes=(0, 1))
+    assert set(name._joined(there, (0, 1))) == left

@@ -13,8 +13,9 @@ ENDS = 0.5  # ... from so many periods of the highest frequency in the motion ..
 SHORTEST, LONGEST = 0.1, 1.0  # ... but not less, nor more [s]
 WINDOW = 4.0  # [s] of the spectrum's windows
 CERTAIN = 1.3  # times the noise that a spectrum must exceed before any of it counts as signal: its own scatter
-BINS = 5  # of the spectrum that are averaged; with Kaiser's window they have as many degrees of freedom in one window
-CHANCE = 1e-7  # with which noise alone is as high as the top of a run of frequencies that counts as signal
+BINS = 5  # of the spectrum that are averaged ...
+FREEDOM = 4.2  # ... and how many degrees of freedom they have together in each of Kaiser's windows
+CHANCE = 1e-6  # with which noise alone is as high as the top of a run of frequencies that counts as signal
 
 
 def without_noise(
@@ -93,11 +94,11 @@ def _signal_share(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarra
     share = np.clip(1.0 - CERTAIN * floor / smooth, 0.0, 1.0)
     share[f < 1.0] = 1.0  # below, windows of four seconds can't tell
     # Of hundreds of frequencies some stand out by chance; differentiated twice, those would be what is loudest.
-    freedom = BINS * max(2 * len(x) // _window(x, rate) - 1, 1)
-    runs, count = ndimage.label(share > 0.0)
-    top = ndimage.maximum(np.where(f < 1.0, np.inf, smooth), runs, np.arange(count + 1))
-    sure = top > floor * special.chdtri(freedom, CHANCE) / freedom
-    return np.where(sure[runs], share, 0.0), floor, f
+    count = max(2 * len(x) // _window(x, rate) - 1, 1)  # windows; their median is less than their mean
+    sure = floor * 2 * count / special.chdtri(2 * count, 0.5) * special.chdtri(FREEDOM * count, CHANCE)
+    runs, last = ndimage.label(share > 0.0)
+    top = ndimage.maximum(np.where(f < 1.0, np.inf, smooth), runs, np.arange(last + 1))
+    return np.where((top > sure / (FREEDOM * count))[runs], share, 0.0), floor, f
 
 
 def _window(x: np.ndarray, rate: float) -> int:
