@@ -3,9 +3,10 @@
 import pytest
 
 from irb140_jax.mismatch import diagnose
-from irb140_jax.recordings.conceal import Concealment, conceal
+from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
+from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import three_motions
-from irb140_jax.robot import irb140, irb140_path
+from irb140_jax.robot import irb140, irb140_path, robot_from_model
 
 SHARE = 0.15  # of the joint's torque
 # Where it sits and what the words for its variables must hold.
@@ -27,6 +28,18 @@ def test_it_is_located_by_joint_and_variables_and_not_named(slug):
     (rest,) = diagnosis["unexplained"]
     assert rest["joints"] == [joint]
     assert variables in str(rest)
+
+
+def test_a_damper_between_joints_is_no_viscous_friction():
+    xml = random_robot(8, 3)
+    robot = robot_from_model(arm_spec(xml).compile(), source="random robot")
+    motions = three_motions(robot, 15.0, 500.0, seed=1)
+    diagnosis = diagnose(
+        robot, conceal(xml, [Concealment("cross_damping", ("joint3",), SHARE)], motions, seed=2).recordings
+    ).diagnosis
+    assert diagnosis["findings"] == []
+    (rest,) = diagnosis["unexplained"]
+    assert rest["joints"] == ["joint3"] and "joint2" in rest["where"]
 
 
 def test_viscous_friction_stays_beside_friction_that_grows_with_load_where_more_is_left():

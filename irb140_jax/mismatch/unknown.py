@@ -12,7 +12,7 @@ from scipy import signal
 
 from irb140_jax.mismatch.explain import Explanation, full_posterior
 from irb140_jax.mismatch.noise import spread
-from irb140_jax.mismatch.prove import HeldOut
+from irb140_jax.mismatch.prove import HeldOut, held_out_gain
 from irb140_jax.mismatch.rows import Stretch
 
 FEATURES = 60  # random Fourier features a competitor
@@ -32,6 +32,8 @@ BELITTLED = 0.16  # size of a nameless structure, over that of a finding, from w
 NO_WORSE = 0.2  # ... if its competitor errs by at most so much more without the finding, times that ratio
 BETTER = 0.95  # and without any finding: where it distorts what is simple without it
 SAME = 0.9  # of a rarer finding's variance, from which the structure's variables are the finding's own
+LITTLE = 0.25  # of the unseen error: ordinary friction that removes less of it ...
+LARGE = 0.4  # ... and leaves so much of its own size without a name is not what that joint has
 ALMOST_ALL = 0.8
 NEARLY = 2.0 / 3.0
 
@@ -262,9 +264,9 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
     """Findings that only stand in for the structure, smallest first, each on top of those before.
 
     Its variables predict as well without them; or they are rarer laws that leave more than they name, or so much in
-    their own variables that the form must be another.  Dry and viscous friction come together: where another law of
-    friction is named at the joint, ordinary friction is there, and in doubt only if it makes the structure harder to
-    predict.
+    their own variables that the form must be another; or ordinary friction that leaves much and hardly helps on unseen
+    data.  Dry and viscous friction come together: where another law of friction is named at the joint, ordinary
+    friction is there, and in doubt only if it makes the structure harder to predict.
     """
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     w, at, torques = post.mean * ex.data.scale[post.columns], ex.data.nuisances, {}
@@ -285,7 +287,7 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
         form = ratio > 1.0 or _scores(carrier, own[:, None])[0] > SAME
         law = ex.data.candidates[index].effect
         sure = law.ordinary and any(ex.data.candidates[i].effect.friction for i in torques if i != index)
-        form = form and not law.ordinary
+        form = form if not law.ordinary else ratio > LARGE and held_out_gain(ex, index)[0] < LITTLE
         if error < BETTER or (
             not sure and ratio > BELITTLED and (form or error < 1.0 + NO_WORSE * min(ratio, 1.0))
         ):
