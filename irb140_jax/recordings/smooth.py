@@ -96,8 +96,8 @@ def _signal_share(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarra
     # Of hundreds of frequencies some stand out by chance; differentiated twice, those would be what is loudest.
     count = max(2 * len(x) // _window(x, rate) - 1, 1)  # windows; their median is less than their mean
     sure = floor * 2 * count / special.chdtri(2 * count, 0.5) * special.chdtri(FREEDOM * count, CHANCE)
-    runs, last = ndimage.label(share > 0.0)
-    top = ndimage.maximum(np.where(f < 1.0, np.inf, smooth), runs, np.arange(last + 1))
+    runs = np.cumsum(np.diff(share > 0.0, prepend=True))
+    top = np.asarray(ndimage.maximum(np.where(f < 1.0, np.inf, smooth), runs, np.arange(runs[-1] + 1)))
     return np.where((top > sure / (FREEDOM * count))[runs], share, 0.0), floor, f
 
 
