@@ -15,6 +15,7 @@ from irb140_jax.errors import InputError
 from irb140_jax.recordings import conceal as conceal_module
 from irb140_jax.recordings.conceal import Concealment, Noise, conceal, demo_case, random_robot, seal
 from irb140_jax.recordings.concealed.catalogue import FIRST_NINE, HIDDEN
+from irb140_jax.recordings.concealed.closed_loop import _rings
 from irb140_jax.recordings.concealed.plant import arm_model, arm_spec, perturb_inertials, rigid_torque
 from irb140_jax.recordings.excite import fourier_motion, point_to_point_motion, slow_motion, three_motions
 from irb140_jax.robot import irb140, irb140_path, robot_from_model
@@ -183,6 +184,14 @@ def test_contact_leaves_no_trace_while_the_tool_is_off_the_wall():
         assert left_out[depth < 0.0].max(initial=0.0) < 1e-8
         touched.append(left_out[depth > 1e-9])
     assert np.concatenate(touched).min() > 0.0
+
+
+def test_a_loop_that_rings_at_the_engines_step_is_refused_and_one_at_rest_is_not():
+    t = 0.001 * np.arange(4000)
+    smooth, first = np.stack([np.sin(t), np.zeros(len(t))], axis=1), np.array([1.0, 0.0])
+    burst = np.outer(np.exp(-(((t - 2.0) / 0.05) ** 2)) * (-1.0) ** np.arange(len(t)), [1.0, 1.0])
+    assert not _rings(smooth) and not _rings(smooth + 0.1 * first * burst)
+    assert _rings(smooth + first * burst) and _rings(smooth + (1.0 - first) * burst)
 
 
 def test_external_wrench_acts_in_its_window_of_one_recording_only():

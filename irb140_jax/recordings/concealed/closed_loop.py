@@ -5,12 +5,14 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from scipy import ndimage
 
 from irb140_jax.errors import InputError
 from irb140_jax.recordings.concealed.hidden import Hidden, Log, Plant
 from irb140_jax.recordings.excite import Excitation
 
 SETTLING = 0.4  # [s] of standing still at the start before the log begins, so that it doesn't begin with a jolt
+RINGING = 50, 0.3  # steps, and the share of the torque with which it alternates from step to step meanwhile
 BANDWIDTH = 60.0  # [rad/s] of the position loop, some 10 Hz: usual for an arm of this size
 
 
@@ -71,7 +73,7 @@ def closed_loop(
         # What accelerates and carries the links is what the gear transmitted: applied torque less friction.
         plant.load = (data.qfrc_applied + data.qfrc_passive + data.qfrc_constraint)[dofs]
     qd[steps] = data.qvel[dofs]
-    if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.isfinite(tau).all():
+    if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.isfinite(tau).all() or _rings(tau):
         raise InputError(
             f"motion {motion.name!r}: the closed loop becomes unstable; hide less, or sample the motion finer"
         )
@@ -79,3 +81,13 @@ def closed_loop(
     for effect in hidden:
         log = effect.measured(log)
     return log
+
+
+def _rings(tau: np.ndarray) -> bool:
+    """Whether torques (T, n) alternate from step to step: in a log that holds every other one that is a push."""
+    steps, share = RINGING
+    bend = 0.25 * np.diff(tau, 2, axis=0)
+    back = np.where(np.sign(bend[1:]) != np.sign(bend[:-1]), np.abs(bend[1:]), 0.0)
+    rms = np.sqrt(np.mean(tau**2, axis=0))
+    level = np.maximum(rms, 1e-3 * rms.max() + 1e-9)  # of a joint that hardly does anything, rounding may alternate
+    return bool(np.any(ndimage.uniform_filter1d(back, steps, axis=0) > share * level))
