@@ -87,3 +87,11 @@ def test_a_lean_of_the_base_takes_from_friction_on_each_joint_what_it_feigns(lea
     coulomb = [("coulomb_friction", (0,), [TURNS, none]), ("coulomb_friction", (1,), [none, TURNS])]
     there = problem([*laws, *coulomb, ("gravity_tilt", (0, 1), [WAVE, WAVE])], 50.0 * np.stack(bent), shapes=(0, 1))
     assert set(name._joined(there, (0, 1))) == left
+
+
+def test_a_thousandth_of_the_torque_is_no_push():
+    y, slugs = (1e4 * TURNS + 5.0 * WAVE)[None], ("payload", "external_wrench", "gravity_spring")
+    there = problem([(slug, (0,), [x]) for slug, x in zip(slugs, (TURNS, WAVE, WAVE), strict=True)], y)
+    odds = there.scores((0,))[1]
+    assert odds > 100.0 * name.ACCEPT  # white noise is far smaller
+    assert there.feigned((0,), odds)[1] > odds > there.feigned((0,), odds)[2]

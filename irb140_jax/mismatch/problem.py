@@ -202,7 +202,7 @@ class Problem:
 
         Friction is feigned by friction: what tilts, weighs or springs does not turn with the direction of motion.  What
         acts on several joints may be feigned at each, for reversals that encoders do not see are late at all of them;
-        but no more at a joint than comes from there.  What is `UNSURE` of the torque itself may feign lateness.
+        but no more at a joint than comes from there.  What is `UNSURE` of the torque may feign lateness or a push.
 
         Args:
             chosen: The set.
@@ -220,8 +220,12 @@ class Problem:
 
     @cached_property
     def _unsure(self) -> np.ndarray:
-        """Half the whitened square of `UNSURE` of the torque at each joint of what is late, shape (n, candidates)."""
-        return 0.5 * UNSURE**2 * self.torque_energy.sum(axis=0)[:, None] * (self.at_joint & self._late)
+        """Half the whitened square of `UNSURE` of the torque at each joint of what is late or happens once.
+
+        Shape (n, candidates).
+        """
+        once = np.array([c.effect.once for c in self.candidates])
+        return 0.5 * UNSURE**2 * self.torque_energy.sum(axis=0)[:, None] * (self.at_joint & (self._late | once))
 
     @cached_property
     def friction(self) -> np.ndarray:

@@ -18,7 +18,7 @@ from irb140_jax.mismatch.rows import Stretch
 FEATURES = 60  # random Fourier features a competitor
 SHIFTS = 99  # circular time shifts that make the null
 MATERIAL_SHARE = 0.05  # of the remaining residual's variance; less is not worth a person's time
-MATERIAL_TORQUE = 0.015  # of the joint's torque RMS; below, what smoothing and imperfect laws leave
+MATERIAL_TORQUE = 0.02  # of the joint's torque RMS; below, what smoothing and imperfect laws leave
 SIGNIFICANT = 0.01
 SEED = 20260
 SLOWEST, FASTEST = 0.3, 8.0  # Hz: oscillators that the competitor with a memory may hold
