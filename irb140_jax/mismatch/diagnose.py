@@ -15,7 +15,7 @@ from irb140_jax.mismatch import locate
 from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior, withdrawn
 from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
-from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, refitted, transferring
+from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, lasting, refitted, transferring
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
@@ -97,7 +97,7 @@ def _diagnosed(
         )
     ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, progress)
     progress("proving on data that the fit did not see")
-    ex = transferring(ex)
+    ex = lasting(transferring(ex))
     refit = refitted(ex)
     proof = held_out(ex, refit)
     progress("looking for structure that no effect explains")

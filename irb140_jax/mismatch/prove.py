@@ -7,7 +7,7 @@ import numpy as np
 from irb140_jax.mismatch.assemble import BLOCKS
 from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
 from irb140_jax.mismatch.explain import Explanation, full_posterior
-from irb140_jax.mismatch.name import PREFER, possible_beside, simpler
+from irb140_jax.mismatch.name import ACCEPT, PREFER, possible_beside, simpler
 from irb140_jax.mismatch.noise import noise_from_residuals
 
 MOST_OF_IT = 0.5  # of what is known of an amplitude, beyond which the block that holds it is no sample of its scatter
@@ -177,6 +177,30 @@ def transferring(ex: Explanation) -> Explanation:
         ex = dataclasses.replace(ex, chosen=better)
 
 
+def lasting(ex: Explanation) -> Explanation:
+    """The explanation without findings whose amplitude is not beyond what it scatters over the recordings by.
+
+    White noise would be sure of a trace that each recording puts elsewhere: of a law that is another's shadow.  What
+    the scatter says of an amplitude takes the place of what white noise would in the evidence for it.
+    """
+    while True:
+        post, wide, at = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), scatter(ex), ex.data.nuisances
+        odds = {}
+        for i, member in zip(ex.chosen, ex.members, strict=True):
+            part = slice(at, at + len(member.columns))
+            at += len(member.columns)
+            known = np.linalg.inv(post.cov[part, part])
+            lost = post.mean[part] @ known @ post.mean[part]
+            kept = (post.mean[part] / wide[part]) @ known @ (post.mean[part] / wide[part])
+            alone = ex.problem.odds(tuple(x for x in ex.chosen if x != i), (i,))
+            odds[i] = alone - 0.5 * (lost - kept) + float(np.log(wide[part]).sum())
+        named = [i for i in ex.chosen if not ex.data.candidates[i].effect.silent]
+        least = min(named, key=lambda i: odds[i], default=None)
+        if least is None or odds[least] >= ACCEPT:
+            return ex
+        ex = dataclasses.replace(ex, chosen=tuple(i for i in ex.chosen if i != least))
+
+
 def _strain(ex: Explanation, chosen: tuple[int, ...]) -> float:
     """Squared shift of the inertials that a set needs, in stated standard deviations."""
     mean = full_posterior(ex.data, ex.problem, ex.grams, chosen).mean
@@ -184,26 +208,30 @@ def _strain(ex: Explanation, chosen: tuple[int, ...]) -> float:
 
 
 def jackknife_factor(ex: Explanation) -> np.ndarray:
-    """How much wider than the posterior the estimates scatter, per amplitude, never below 1.
+    """How much wider than the posterior the estimates are, per amplitude, never below 1.
+
+    As much as they scatter; and what is out of time is known no better than the smoothing and the steps of the control,
+    which are as late in all blocks.
+    """
+    imitated = ex.problem.imitated[list(ex.chosen)]
+    late = [np.full(len(m.columns), i) for m, i in zip(ex.members, imitated, strict=True)]
+    return np.hypot(scatter(ex), np.concatenate([np.zeros(ex.data.nuisances), *late]))
+
+
+def scatter(ex: Explanation) -> np.ndarray:
+    """How much wider than the posterior the estimates scatter over the recordings, per amplitude, never below 1.
 
     Blocks are left out in turn; scatter over recordings is the primary error bar, since it sees what white noise
-    does not: laws that fit here and not there.  Of what happens once, a block that holds most of what is known says
-    little of scatter when it goes: its weight is that of its share (Busing, Meijer and van der Leeden, Statistics and
-    Computing 9, 1999).  What is out of time is known no better than the smoothing and the steps of the control, which
-    are as late in all blocks.
+    does not: laws that fit here and not there.  A block that holds most of what is known, of a push or of a wall that
+    is touched once, says little of scatter when it goes: its weight is that of its share (Busing, Meijer and van der
+    Leeden, Statistics and Computing 9, 1999).
     """
     whole = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     blocks = len(ex.grams.recording)
     left_out = [np.arange(blocks) == b for b in range(blocks)]
     posts = [full_posterior(ex.data, ex.problem, ex.grams, ex.chosen, b) for b in left_out]
     known, means = np.maximum(np.diag(whole.cov), 1e-300), np.array([p.mean for p in posts])
-    each = [np.full(len(m.columns), m.effect.once) for m in ex.members]
-    once = np.concatenate([np.full(ex.data.nuisances, False), *each])
     share = np.maximum(1.0 - known / [np.diag(p.cov) for p in posts], MOST_OF_IT)
-    weight = np.where(once & (share > MOST_OF_IT), (1.0 - share) / share, blocks - 1.0)
-    centre = np.where(once, whole.mean, means.mean(axis=0))
-    variance = np.sum(weight * (means - centre) ** 2, axis=0) / blocks
-    imitated = ex.problem.imitated[list(ex.chosen)]
-    late = [np.full(len(m.columns), i) for m, i in zip(ex.members, imitated, strict=True)]
-    late = np.concatenate([np.zeros(ex.data.nuisances), *late])
-    return np.sqrt(np.maximum(variance / known, 1.0) + late**2)
+    weight = np.where(share > MOST_OF_IT, (1.0 - share) / share, blocks - 1.0)
+    variance = np.sum(weight * (means - whole.mean) ** 2, axis=0) / blocks
+    return np.sqrt(np.maximum(variance / known, 1.0))
