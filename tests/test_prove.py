@@ -6,8 +6,9 @@ from helpers_recordings import recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
+from irb140_jax.mismatch import prove
 from irb140_jax.mismatch.explain import Explanation, explain
-from irb140_jax.mismatch.prove import folds, held_out, refitted
+from irb140_jax.mismatch.prove import folds, held_out, lasting, refitted
 from irb140_jax.recordings.condition import choose_band, condition
 
 FRICTION = tuple(CATALOGUE[slug] for slug in ("coulomb_friction", "viscous_friction"))
@@ -45,6 +46,19 @@ def test_what_one_recording_alone_holds_is_proved_within_it(one_alone):
     proof = held_out(one_alone, refitted(one_alone))
     # As good as on data that the fit saw; with that recording left out whole, the friction is a guess: 1.4 times it.
     assert np.all(proof.rmse(proof.corrected)[viscous] < 1.1 * proof.floor[viscous])
+
+
+def test_an_amplitude_must_exceed_what_it_scatters_by(alike, monkeypatch):
+    least = min(alike.chosen, key=lambda i: alike.problem.odds(tuple(c for c in alike.chosen if c != i), (i,)))
+    deviations = np.sqrt(2.0 * alike.problem.odds(tuple(c for c in alike.chosen if c != least), (least,)))
+
+    def overwhelming(ex: Explanation, _) -> np.ndarray:
+        """Scatter by which the least certain finding is a fifth of a standard deviation off nothing."""
+        wide = [5.0 * deviations if i == least else 1.0 for i in ex.chosen]
+        return np.concatenate([np.ones(ex.data.nuisances), wide])
+
+    monkeypatch.setattr(prove, "scatter", overwhelming)
+    assert lasting(alike).chosen == tuple(i for i in alike.chosen if i != least)
 
 
 def test_sums_over_windows_gain_what_the_windows_themselves_gain():

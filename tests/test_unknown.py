@@ -30,6 +30,17 @@ def test_it_is_located_by_joint_and_variables_and_not_named(slug):
     assert variables in str(rest)
 
 
+def test_what_goes_with_time_counts_where_a_slow_sweep_makes_position_go_with_time_too():
+    """Copies of the residual, shifted in time, are as predictable by position there: it is no surer than chance."""
+    xml = random_robot(100, 1)
+    robot = robot_from_model(arm_spec(xml).compile(), source="random robot")
+    motions = three_motions(robot, 15.0, 500.0, seed=113)
+    case = conceal(xml, [Concealment("back_emf_sag", ("joint1",), SHARE)], motions, seed=2)
+    diagnosis = diagnose(robot, case.recordings).diagnosis
+    assert diagnosis["findings"] == []
+    assert [u["joints"] for u in diagnosis["unexplained"]] == [["joint1"]]
+
+
 def test_a_damper_between_joints_is_no_viscous_friction():
     xml = random_robot(8, 3)
     robot = robot_from_model(arm_spec(xml).compile(), source="random robot")

@@ -1,6 +1,7 @@
 """Does it hold on data that the fit did not see?  Recordings, or blocks of a single one, are left out in turn."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -178,24 +179,28 @@ def transferring(ex: Explanation) -> Explanation:
 
 
 def lasting(ex: Explanation) -> Explanation:
-    """The explanation without findings whose amplitude is not beyond what it scatters over the recordings by.
+    """The explanation without findings that are not beyond what their amplitudes scatter by over the recordings.
 
     White noise would be sure of a trace that each recording puts elsewhere: of a law that is another's shadow.  What
-    the scatter says of an amplitude takes the place of what white noise would in the evidence for it.
+    the scatter says of an amplitude takes the place of what white noise would in the evidence for it.  Of what is late,
+    smoothing and control in steps may make any part up to a bound: what is beyond it counts.
     """
     while True:
-        post, wide, at = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), scatter(ex), ex.data.nuisances
+        post, at = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), ex.data.nuisances
+        # What happens in one block only is not contradicted by the others.
+        wide = scatter(ex, [True] * len(ex.chosen))
         odds = {}
         for i, member in zip(ex.chosen, ex.members, strict=True):
             part = slice(at, at + len(member.columns))
             at += len(member.columns)
-            known = np.linalg.inv(post.cov[part, part])
-            lost = post.mean[part] @ known @ post.mean[part]
-            kept = (post.mean[part] / wide[part]) @ known @ (post.mean[part] / wide[part])
+            if member.effect.silent:
+                continue
+            mean, known = post.mean[part], np.linalg.inv(post.cov[part, part])
+            bound = np.sqrt(3.0 * np.diag(post.cov[part, part])) * ex.problem.imitated[i]
+            sure = np.sign(mean) * np.maximum(np.abs(mean) - bound, 0.0) / wide[part]
             alone = ex.problem.odds(tuple(x for x in ex.chosen if x != i), (i,))
-            odds[i] = alone - 0.5 * (lost - kept) + float(np.log(wide[part]).sum())
-        named = [i for i in ex.chosen if not ex.data.candidates[i].effect.silent]
-        least = min(named, key=lambda i: odds[i], default=None)
+            odds[i] = alone - 0.5 * (mean @ known @ mean - sure @ known @ sure) + float(np.log(wide[part]).sum())
+        least = min(odds, key=lambda i: odds[i], default=None)
         if least is None or odds[least] >= ACCEPT:
             return ex
         ex = dataclasses.replace(ex, chosen=tuple(i for i in ex.chosen if i != least))
@@ -215,23 +220,32 @@ def jackknife_factor(ex: Explanation) -> np.ndarray:
     """
     imitated = ex.problem.imitated[list(ex.chosen)]
     late = [np.full(len(m.columns), i) for m, i in zip(ex.members, imitated, strict=True)]
-    return np.hypot(scatter(ex), np.concatenate([np.zeros(ex.data.nuisances), *late]))
+    return np.hypot(
+        scatter(ex, [m.effect.once for m in ex.members]), np.concatenate([np.zeros(ex.data.nuisances), *late])
+    )
 
 
-def scatter(ex: Explanation) -> np.ndarray:
+def scatter(ex: Explanation, lopsided: Sequence[bool]) -> np.ndarray:
     """How much wider than the posterior the estimates scatter over the recordings, per amplitude, never below 1.
 
     Blocks are left out in turn; scatter over recordings is the primary error bar, since it sees what white noise
-    does not: laws that fit here and not there.  A block that holds most of what is known, of a push or of a wall that
-    is touched once, says little of scatter when it goes: its weight is that of its share (Busing, Meijer and van der
-    Leeden, Statistics and Computing 9, 1999).
+    does not: laws that fit here and not there.
+
+    Args:
+        ex: The explanation.
+        lopsided: Of which of its members a block that holds most of what is known, of a push or of a wall that is
+            touched once, is no sample of scatter: when it goes, its weight is that of its share (Busing, Meijer and
+            van der Leeden, Statistics and Computing 9, 1999).
     """
     whole = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     blocks = len(ex.grams.recording)
     left_out = [np.arange(blocks) == b for b in range(blocks)]
     posts = [full_posterior(ex.data, ex.problem, ex.grams, ex.chosen, b) for b in left_out]
     known, means = np.maximum(np.diag(whole.cov), 1e-300), np.array([p.mean for p in posts])
+    each = [np.full(len(m.columns), one) for m, one in zip(ex.members, lopsided, strict=True)]
+    spared = np.concatenate([np.full(ex.data.nuisances, False), *each])
     share = np.maximum(1.0 - known / [np.diag(p.cov) for p in posts], MOST_OF_IT)
-    weight = np.where(share > MOST_OF_IT, (1.0 - share) / share, blocks - 1.0)
-    variance = np.sum(weight * (means - whole.mean) ** 2, axis=0) / blocks
+    weight = np.where(spared & (share > MOST_OF_IT), (1.0 - share) / share, blocks - 1.0)
+    centre = np.where(spared, whole.mean, means.mean(axis=0))
+    variance = np.sum(weight * (means - centre) ** 2, axis=0) / blocks
     return np.sqrt(np.maximum(variance / known, 1.0))
