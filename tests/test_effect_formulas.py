@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers_effects import a_shape, every_effect, motion, robot, some_values
+from helpers_effects import SCALES, a_shape, every_effect, motion, robot, some_values
 
 from irb140_jax.effects.backlash import STEPS, _flight
 from irb140_jax.effects.catalogue import CATALOGUE
@@ -179,3 +179,11 @@ def test_the_more_a_flank_is_damped_the_less_a_link_bounces_off_it():
     back = [0.01 - np.asarray(_flight(5.0 * one * np.sign(t - 0.2), one, 0 * one, 0 * one, 0.02, 1e4, d, 0.005))[
         t > 0.3].min() for d in (0.05, 0.2, 0.8)]  # fmt: skip
     assert back[0] > 1.5 * back[1] > 1.5**2 * max(back[2], 0.0)
+
+
+@pytest.mark.parametrize("noise", [1e-5, 1e-3])
+def test_no_gap_below_ten_times_the_encoders_noise_is_looked_for(noise):
+    """A gap of a few of them takes that noise out of the model's torque, and explains it."""
+    gaps = CATALOGUE["backlash"].scan(SCALES._replace(q_noise=np.full(4, noise)), np.array([1]))[:, 0]
+    assert gaps.min() >= 10.0 * noise
+    assert gaps.max() > 10.0 * gaps.min()

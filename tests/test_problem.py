@@ -86,6 +86,14 @@ def test_a_thousandth_of_the_torque_moves_what_is_late_as_much_of_its_own_column
     np.testing.assert_allclose(both.imitated * std, [share / np.sqrt(3.0), 0.0], rtol=1e-12)  # evenly up to it
 
 
+def test_a_push_must_be_more_than_a_thousandth_of_the_torque_of_its_own_recording():
+    """Another may have far less noise, under which a thousandth of its torque is worth more than all of the push."""
+    there = problem([("external_wrench", (0,), [TURNS])], 1e4 * WAVE[None], recordings=2)
+    push = dataclasses.replace(there.candidates[0], shape=np.array([1.0, 2.0, 2.0, 0.01]))  # in the second
+    there = dataclasses.replace(there, candidates=(push,), torque_energy=np.array([[9e8], [1e8]]))
+    assert there.feigned((), 1e9)[0] == pytest.approx(0.5 * UNSURE**2 * 1e8)
+
+
 def test_what_has_no_name_must_be_more_than_a_small_share_and_what_has_one_need_not():
     members = [("soft_friction", (0,), [TURNS]), ("torque_ripple", (0,), [TURNS]), ("external_wrench", (0,), [TURNS])]
     small, large = (problem(members, 1e4 * (WAVE + k * LEAST_SHARE * TURNS)[None]).scores(()) for k in (0.5, 2.0))

@@ -222,10 +222,13 @@ class Problem:
     def _unsure(self) -> np.ndarray:
         """Half the whitened square of `UNSURE` of the torque at each joint of what is late or happens once.
 
-        Shape (n, candidates).
+        Of the torque of the recording in which it happens: others may have far less noise.  Shape (n, candidates).
         """
-        once = np.array([c.effect.once for c in self.candidates])
-        return 0.5 * UNSURE**2 * self.torque_energy.sum(axis=0)[:, None] * (self.at_joint & (self._late | once))
+        felt = np.where(self._late, self.torque_energy.sum(axis=0)[:, None], 0.0)
+        for i, c in enumerate(self.candidates):
+            if c.effect.once:
+                felt[:, i] = self.torque_energy[c.effect.during(c.shape)[0]]
+        return 0.5 * UNSURE**2 * felt * self.at_joint
 
     @cached_property
     def friction(self) -> np.ndarray:
