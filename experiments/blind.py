@@ -14,6 +14,7 @@ import pathlib
 import tempfile
 from typing import Literal
 
+import jax
 import numpy as np
 import tyro
 from pages import page_of
@@ -168,6 +169,7 @@ def main() -> None:
             if seed in done:
                 continue
             case = judged(config.kind, seed)
+            jax.clear_caches()  # every robot compiles its own; hundreds would be more than a process may map
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(case) + "\n")
             mark = "ok  " if case["exact"] else "MISS"

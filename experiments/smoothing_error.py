@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from trials import case_of
+from trials import Kind, case_of
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.recordings import smooth
@@ -21,7 +21,7 @@ from irb140_jax.recordings.condition import choose_band, conditioned
 from irb140_jax.recordings.low_pass import filtered, kernels
 from irb140_jax.robot import Robot
 
-CASES = {"single": range(1, 62, 6), "several": range(0, 20, 2), "rough": range(0, 20, 2)}
+CASES: dict[Kind, range] = {"single": range(1, 62, 6), "several": range(0, 20, 2), "rough": range(0, 20, 2)}
 ENDS = 0.5  # s at either end that do not count: there the derivative is a matter of its own
 WITHOUT = {"CERTAIN": 1.5, "CHANCE": 1.0}
 
