@@ -1,8 +1,13 @@
 """Physics in no library, made by MuJoCo: it is located by joint and by variables, and no name is forced upon it."""
 
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
 import pytest
 
 from irb140_jax.mismatch import diagnose
+from irb140_jax.mismatch.unknown import Rows, _scores, competitors
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import three_motions
@@ -61,3 +66,16 @@ def test_viscous_friction_stays_beside_friction_that_grows_with_load_where_more_
     diagnosis = diagnose(robot, case.recordings).diagnosis
     assert {f["effect"] for f in diagnosis["findings"]} == {"load_dependent_friction", "viscous_friction"}
     assert [u["joints"] for u in diagnosis["unexplained"]] == [["joint2"]]
+
+
+@pytest.mark.parametrize("louder", [1.0, 100.0])
+def test_what_one_recording_leaves_is_seen_to_go_with_time_however_much_louder_it_is(louder):
+    rng, t = np.random.default_rng(0), 0.03 * np.arange(500)
+    one: Any = SimpleNamespace(t=t, **{k: rng.normal(size=(500, 1)) for k in ("q", "qd", "qdd", "nominal")})
+    quiet, slow = rng.normal(size=500), np.sqrt(2.0) * np.sin(2.0 * np.pi * 0.3 * t)
+    rows = Rows(
+        [np.full(500, True)] * 2, np.append(quiet, slow), np.repeat([1.0, louder], 500), np.repeat([0, 1], 500)
+    )
+    time = competitors([one, one], 0, rows, ("hinge",))[-1]
+    assert time.variable.startswith("time")
+    assert 0.4 < _scores(time, rows.residual[:, None])[0] < 0.6  # all of one recording, nothing of the other

@@ -131,9 +131,13 @@ def _carrier(rivals: list[Competitor], shares: np.ndarray) -> int:
 
 
 def competitors(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
-    """All competitors for what is left at joint `j`, weighted like the residual."""
+    """All competitors for what is left at joint `j`, weighted like the residual.
+
+    Not that of time: each recording has amplitudes of its own, which weights would make as small as the ridge.
+    """
     weight = (np.median(rows.level) / rows.level)[:, None]
-    return [c._replace(features=weight * c.features) for c in _unweighted(stretches, j, rows, names)]
+    rivals = _unweighted(stretches, j, rows, names)
+    return [c._replace(features=weight * c.features) if c.shifts else c for c in rivals]
 
 
 def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
