@@ -7,7 +7,7 @@ from helpers_recordings import recording, robot
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
 from irb140_jax.mismatch import prove
-from irb140_jax.mismatch.explain import Explanation, explain
+from irb140_jax.mismatch.explain import Explanation, explain, explained_by
 from irb140_jax.mismatch.prove import folds, held_out, lasting, refitted
 from irb140_jax.recordings.condition import choose_band, condition
 
@@ -59,6 +59,21 @@ def test_an_amplitude_must_exceed_what_it_scatters_by(alike, monkeypatch):
 
     monkeypatch.setattr(prove, "scatter", overwhelming)
     assert lasting(alike).chosen == tuple(i for i in alike.chosen if i != least)
+
+
+def test_where_nothing_is_named_what_is_corrected_is_the_refit(alike):
+    bare = explained_by(alike, ())
+    assert bare.noise_of == () and np.all(bare.noise.total > alike.noise.total)
+    proof = held_out(bare, refitted(bare))
+    for refit, corrected in zip(proof.refit, proof.corrected, strict=True):
+        np.testing.assert_allclose(corrected, refit, rtol=1e-9, atol=1e-12)
+
+
+def test_a_set_is_weighted_by_the_noise_that_it_leaves(alike):
+    fewer = alike.chosen[:-1]
+    again = explained_by(explained_by(alike, fewer), alike.chosen)
+    assert again.noise_of == alike.chosen
+    np.testing.assert_allclose(again.noise.total, alike.noise.total, rtol=0.01)
 
 
 def test_sums_over_windows_gain_what_the_windows_themselves_gain():

@@ -12,7 +12,7 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
-from irb140_jax.mismatch.explain import Explanation, explain, fitted, full_posterior, withdrawn
+from irb140_jax.mismatch.explain import Explanation, explain, explained_by, fitted, full_posterior
 from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, lasting, refitted, transferring
@@ -104,7 +104,8 @@ def _diagnosed(
     rest = unexplained(ex, proof)
     doubtful = {c for u in rest for c in u.doubtful}
     if doubtful:  # names that only stand in for what has none
-        ex = withdrawn(ex, doubtful)
+        ex = explained_by(ex, tuple(c for c in ex.chosen if c not in doubtful))
+        refit = refitted(ex)
         proof = held_out(ex, refit)
         rest = unexplained(ex, proof)
     found = findings(robot, ex)

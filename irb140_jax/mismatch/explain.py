@@ -1,7 +1,7 @@
 """The loop at the heart of a diagnosis: columns, noise, search, and again with finer shapes and the corrected load."""
 
 import dataclasses
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
 from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble, first_noise, problem
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
-from irb140_jax.mismatch.evidence import Grams, Posterior, posterior
+from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
 from irb140_jax.mismatch.model import Named, better_known, composed
 from irb140_jax.mismatch.name import guessed, search
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.problem import Problem
-from irb140_jax.mismatch.rows import stretch
+from irb140_jax.mismatch.rows import Stretch, stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
 from irb140_jax.mismatch.silent import SoftFriction
 from irb140_jax.mismatch.tangent import Point, point
@@ -24,6 +24,7 @@ from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
 WEIGHTLESS = 0.43  # standard deviations of a payload's mass: with less, the odds that there is any are below two to one
+SETTLED = 2  # rounds in which the noise and what leaves it agree
 PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both
 
 
@@ -36,6 +37,7 @@ class Explanation:
         scales: Sizes of the recordings.
         data: Low-passed rows.
         noise: Whitening under the explanation.
+        noise_of: Indices of the candidates that leave this noise.
         problem: Search problem.
         grams: Gram matrices by block.
         chosen: Indices of the candidates in the explanation.
@@ -46,6 +48,7 @@ class Explanation:
     scales: Scales
     data: Data
     noise: Noise
+    noise_of: tuple[int, ...]
     problem: Problem
     grams: Grams
     chosen: tuple[int, ...]
@@ -115,7 +118,9 @@ def explain(
         loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
         (lib, chosen), noise = _refined(ex), ex.noise
         del ex  # hundreds of megabytes, before the next
-    return _of_some_weight(explained(PASSES, BLOCKS))
+    ex = _of_some_weight(explained(PASSES, BLOCKS))
+    # The last search may have found another set than that whose noise it was weighted by.
+    return explained_by(ex, ex.chosen)
 
 
 def _settled(
@@ -130,19 +135,19 @@ def _settled(
     for find in rounds:
         prob, g = problem(data, noise, blocks=1, settled=settled)
         chosen = find(prob, chosen)
-        noise = _noise_under(data, prob, g, chosen)
+        noise = _noise_under(data, prob, chosen, noise, rounds=1)
         del prob, g  # hundreds of megabytes, before the next are made
     prob, g = problem(data, noise, blocks, settled=settled)
-    return Explanation(lib, scales, data, noise, prob, g, search(prob, chosen), factor)
+    return Explanation(lib, scales, data, noise, chosen, prob, g, search(prob, chosen), factor)
 
 
 def _of_some_weight(ex: Explanation) -> Explanation:
     """The explanation without what should have a mass and has none, and with what is then found: see `WEIGHTLESS`."""
-    post, at, weightless = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), ex.data.nuisances, set()
-    for c in ex.members:
-        if c.effect.tied and post.mean[at] < WEIGHTLESS * np.sqrt(post.cov[at, at]):
+    post, weightless = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), set()
+    for c, part in zip(ex.members, parts(ex.data, ex.chosen), strict=True):
+        mass = part.start
+        if c.effect.tied and post.mean[mass] < WEIGHTLESS * np.sqrt(post.cov[mass, mass]):
             weightless.add((c.slug, c.joints))
-        at += len(c.columns)
     if not weightless:
         return ex
     none = np.array([(c.slug, c.joints) in weightless for c in ex.data.candidates])
@@ -150,34 +155,70 @@ def _of_some_weight(ex: Explanation) -> Explanation:
     return dataclasses.replace(ex, problem=prob, chosen=search(prob, tuple(i for i in ex.chosen if not none[i])))
 
 
-def withdrawn(ex: Explanation, names: Collection[int]) -> Explanation:
-    """The explanation without some candidates, weighted by the noise that it then leaves."""
-    chosen = tuple(c for c in ex.chosen if c not in names)
-    noise = _noise_under(ex.data, ex.problem, ex.grams, chosen)
-    prob, g = problem(ex.data, noise)
-    return dataclasses.replace(ex, noise=noise, problem=prob, grams=g, chosen=chosen)
+def explained_by(ex: Explanation, chosen: tuple[int, ...]) -> Explanation:
+    """The explanation with a set of candidates, weighted by the noise that these leave.
+
+    Where none of them has a name, nothing makes products with the inertials: what is corrected is the refit.
+    """
+    data, named = ex.data, any(ex.data.candidates[i].slug != "inertials" for i in chosen)
+    if set(chosen) == set(ex.noise_of) and (named or all(s.bare for s in data.stretches)):
+        return dataclasses.replace(ex, chosen=chosen)
+    if not named:
+        data = dataclasses.replace(data, stretches=[s.stripped() for s in data.stretches])
+    noise = _noise_under(data, ex.problem, chosen, ex.noise, SETTLED)
+    prob, g = problem(data, noise)
+    prob = dataclasses.replace(prob, lowest=ex.problem.lowest)  # what has no weight has none here
+    return dataclasses.replace(ex, data=data, noise=noise, noise_of=chosen, problem=prob, grams=g, chosen=chosen)
+
+
+def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:
+    """Where each member of a set has its amplitudes in a posterior of inertials and amplitudes."""
+    widths = [len(data.candidates[i].columns) for i in chosen]
+    ends = data.nuisances + np.cumsum(widths, dtype=int)
+    return [slice(int(end) - width, int(end)) for end, width in zip(ends, widths, strict=True)]
 
 
 def full_posterior(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without=None) -> Posterior:
     """Posterior of inertials and chosen amplitudes, in prior units."""
-    columns = np.concatenate([np.arange(data.nuisances), prob.columns(chosen)])
-    named, at = [], data.nuisances
-    for c in (data.candidates[i] for i in chosen):
-        named += [slice(at, at + len(c.columns))] if c.slug != "inertials" else []
-        at += len(c.columns)
+    columns, named = _columns(data, prob, chosen)
     post = posterior(g.of(columns).total(without), np.arange(len(columns)), named)
     return dataclasses.replace(post, columns=columns)
 
 
-def _noise_under(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...]) -> Noise:
-    post = full_posterior(data, prob, g, chosen)
-    coefficients = post.mean * data.scale[post.columns]
-    residuals = [s.y - s.X[..., post.columns] @ coefficients for s in data.stretches]
-    n = residuals[0].shape[1]
-    # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
-    used = len(post.columns) - float(np.trace(post.cov))
-    use, unsure = [s.use for s in data.stretches], [s.unsure for s in data.stretches]
-    return noise_from_residuals(residuals, use, np.full(n, used / n), unsure)
+def noise_left(
+    stretches: list[Stretch], scale: np.ndarray, named: list[slice], noise: Noise, rounds: int = SETTLED
+) -> Noise:
+    """Noise that columns leave, fitted under noise that was guessed before, and again under what they leave.
+
+    Args:
+        stretches: With these columns alone.
+        scale: Their prior standard deviations.
+        named: Those of each named effect; see `posterior`.
+        noise: The guess.
+        rounds: How often.
+    """
+    every, n = np.arange(len(scale)), stretches[0].y.shape[1]
+    use, unsure = [s.use for s in stretches], [s.unsure for s in stretches]
+    for _ in range(rounds):
+        post = posterior(grams(stretches, noise, scale, len(scale), 1).total(), every, named)
+        residuals = [s.y - s.X @ (post.mean * scale) for s in stretches]
+        # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
+        used = len(scale) - float(np.trace(post.cov))
+        noise = noise_from_residuals(residuals, use, np.full(n, used / n), unsure)
+    return noise
+
+
+def _noise_under(data: Data, prob: Problem, chosen: tuple[int, ...], noise: Noise, rounds: int) -> Noise:
+    columns, named = _columns(data, prob, chosen)
+    stretches = [dataclasses.replace(s, X=s.X[..., columns]) for s in data.stretches]
+    return noise_left(stretches, data.scale[columns], named, noise, rounds)
+
+
+def _columns(data: Data, prob: Problem, chosen: tuple[int, ...]) -> tuple[np.ndarray, list[slice]]:
+    """Columns of inertials and chosen amplitudes, and which of those are each named effect's."""
+    each = zip(chosen, parts(data, chosen), strict=True)
+    named = [part for i, part in each if data.candidates[i].slug != "inertials"]
+    return np.concatenate([np.arange(data.nuisances), prob.columns(chosen)]), named
 
 
 def _named(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
@@ -197,16 +238,14 @@ def fitted(
 ) -> tuple[np.ndarray, list[Candidate], list[np.ndarray]]:
     """Shift of the inertial parameters (10 n,), and the named effects with their amplitudes, from a posterior."""
     w = post.mean * data.scale[post.columns]
-    dphi, at = factor @ w[: data.nuisances], data.nuisances
-    members, amplitudes = [], []
-    for c in (data.candidates[i] for i in chosen):
-        part = w[at : at + len(c.columns)]
-        at += len(c.columns)
+    dphi, members, amplitudes = factor @ w[: data.nuisances], [], []
+    for i, part in zip(chosen, parts(data, chosen), strict=True):
+        c = data.candidates[i]
         if c.slug == "inertials":
-            dphi = dphi + factor[:, 10 * c.joints[0] : 10 * c.joints[0] + 10] @ part
+            dphi = dphi + factor[:, 10 * c.joints[0] : 10 * c.joints[0] + 10] @ w[part]
         else:
             members.append(c)
-            amplitudes.append(part)
+            amplitudes.append(w[part])
     return dphi, members, amplitudes
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.explain import Explanation, full_posterior
+from irb140_jax.mismatch.explain import Explanation, full_posterior, parts
 from irb140_jax.mismatch.intervals import others, parameters_of
 from irb140_jax.mismatch.name import PREFER
 from irb140_jax.mismatch.problem import best_of_groups
@@ -26,11 +26,9 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     widen = jackknife_factor(ex)
     w = post.mean * ex.data.scale[post.columns]
     cov = post.cov * np.outer(widen, widen) * np.outer(ex.data.scale[post.columns], ex.data.scale[post.columns])
-    out, at = [], ex.data.nuisances
-    for index in ex.chosen:
+    out = []
+    for index, rows in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
         c = ex.data.candidates[index]
-        rows = slice(at, at + len(c.columns))
-        at += len(c.columns)
         if c.effect.silent:
             continue
         values = parameters_of(robot, ex, index, w[rows], cov[rows, rows], float(np.max(widen[rows])))

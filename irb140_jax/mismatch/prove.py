@@ -7,9 +7,8 @@ import numpy as np
 
 from irb140_jax.mismatch.assemble import BLOCKS
 from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
-from irb140_jax.mismatch.explain import Explanation, full_posterior
+from irb140_jax.mismatch.explain import Explanation, explained_by, full_posterior, noise_left, parts
 from irb140_jax.mismatch.name import ACCEPT, PREFER, possible_beside, simpler
-from irb140_jax.mismatch.noise import noise_from_residuals
 
 MOST_OF_IT = 0.5  # of what is known of an amplitude, beyond which the block that holds it is no sample of its scatter
 ALONE = 0.8  # share of a joint's usable rows, or of a finding's torque, beside which the others say nothing of it
@@ -57,12 +56,10 @@ def folds(ex: Explanation) -> list[np.ndarray]:
 
 def _energy(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:
     """Squared whitened torque of each member of a set in each block, shape (members, blocks)."""
-    mean, at = full_posterior(ex.data, ex.problem, ex.grams, chosen).mean, ex.data.nuisances
+    mean = full_posterior(ex.data, ex.problem, ex.grams, chosen).mean
     out = np.zeros((len(chosen), len(ex.grams.recording)))
-    for k, c in enumerate(chosen):
-        columns = ex.problem.columns((c,))
-        w = mean[at : at + len(columns)]
-        at += len(columns)
+    for k, (c, part) in enumerate(zip(chosen, parts(ex.data, chosen), strict=True)):
+        columns, w = ex.problem.columns((c,)), mean[part]
         out[k] = np.einsum("i,bij,j->b", w, ex.grams.blocks[:, columns[:, None], columns], w)
     return out
 
@@ -86,14 +83,14 @@ class Refit:
 
 
 def refitted(ex: Explanation) -> Refit:
-    """Refit the inertials; links that the explanation found wrong beyond their stated uncertainty are free here too."""
+    """Refit the inertials; links that the explanation found wrong beyond their stated uncertainty are free here too.
+
+    Where nothing is named this is the explanation, under its noise.
+    """
     columns = ex.columns(tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials"))
     stretches = [s.of_rigid_body(columns) for s in ex.data.stretches]
-    noise, scale = ex.noise, ex.data.scale[columns]
-    for _ in range(2):
-        w = posterior(grams(stretches, noise, scale, len(columns), 1).total(), np.arange(len(columns))).mean
-        residuals = [s.y - s.X @ (w * scale) for s in stretches]
-        noise = noise_from_residuals(residuals, [s.use for s in stretches], np.zeros(residuals[0].shape[1]))
+    scale, alone = ex.data.scale[columns], len(columns) == len(ex.columns())
+    noise = ex.noise if alone else noise_left(stretches, scale, [], ex.noise)
     return Refit(grams(stretches, noise, scale, len(columns), BLOCKS), columns)
 
 
@@ -137,8 +134,8 @@ def _only_here(ex: Explanation, chosen: tuple[int, ...], energy: np.ndarray, fol
     """Which columns of a set belong to what happens once, or but for a trace in this fold: no other tells of them."""
     members = [ex.data.candidates[i] for i in chosen]
     alone = energy[:, fold].sum(axis=1) > ALONE * energy.sum(axis=1)
-    parts = [np.full(len(c.columns), c.effect.once or a) for c, a in zip(members, alone, strict=True)]
-    return np.concatenate([np.zeros(ex.data.nuisances, dtype=bool), *parts])
+    each = [np.full(len(c.columns), c.effect.once or a) for c, a in zip(members, alone, strict=True)]
+    return np.concatenate([np.zeros(ex.data.nuisances, dtype=bool), *each])
 
 
 def held_out_gain(ex: Explanation, without: int) -> tuple[float, float]:
@@ -175,7 +172,7 @@ def transferring(ex: Explanation) -> Explanation:
                     worst, better = loss, (*rest, *option)
         if better == ex.chosen:
             return ex
-        ex = dataclasses.replace(ex, chosen=better)
+        ex = explained_by(ex, better)
 
 
 def lasting(ex: Explanation) -> Explanation:
@@ -186,14 +183,12 @@ def lasting(ex: Explanation) -> Explanation:
     smoothing and control in steps may make any part up to a bound: what is beyond it counts.
     """
     while True:
-        post, at = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), ex.data.nuisances
+        post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
         # What happens in one block only is not contradicted by the others.
         wide = scatter(ex, [True] * len(ex.chosen))
         odds = {}
-        for i, member in zip(ex.chosen, ex.members, strict=True):
-            part = slice(at, at + len(member.columns))
-            at += len(member.columns)
-            if member.effect.silent:
+        for i, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
+            if ex.data.candidates[i].effect.silent:
                 continue
             mean, known = post.mean[part], np.linalg.inv(post.cov[part, part])
             bound = np.sqrt(3.0 * np.diag(post.cov[part, part])) * ex.problem.imitated[i]
@@ -203,7 +198,7 @@ def lasting(ex: Explanation) -> Explanation:
         least = min(odds, key=lambda i: odds[i], default=None)
         if least is None or odds[least] >= ACCEPT:
             return ex
-        ex = dataclasses.replace(ex, chosen=tuple(i for i in ex.chosen if i != least))
+        ex = explained_by(ex, tuple(i for i in ex.chosen if i != least))
 
 
 def _strain(ex: Explanation, chosen: tuple[int, ...]) -> float:

@@ -53,6 +53,18 @@ class Stretch:
         own = np.where(columns < k, columns, columns - (self.X.shape[-1] - k))
         return dataclasses.replace(self, X=self.rigid[..., own], y=self.tau - self.nominal)
 
+    @property
+    def bare(self) -> bool:
+        """Whether inertials are as they are without any explanation."""
+        k = self.rigid.shape[-1]
+        return np.array_equal(self.X[..., :k], self.rigid) and np.array_equal(self.y, self.tau - self.nominal)
+
+    def stripped(self) -> "Stretch":
+        """With inertials as they are without any explanation."""
+        k = self.rigid.shape[-1]
+        X = np.concatenate([self.rigid, self.X[..., k:-k], self.rigid], axis=-1)
+        return dataclasses.replace(self, X=X, y=self.tau - self.nominal)
+
 
 def stretch(
     lib: Library, along: Prepared, index: int, band: Band, factor: np.ndarray, loads: Loads | None = None,

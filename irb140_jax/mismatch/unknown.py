@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from irb140_jax.mismatch.explain import Explanation, full_posterior
+from irb140_jax.mismatch.explain import Explanation, full_posterior, parts
 from irb140_jax.mismatch.noise import spread
 from irb140_jax.mismatch.prove import HeldOut, held_out_gain
 from irb140_jax.mismatch.rows import Stretch
@@ -277,14 +277,11 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
     friction is there, and in doubt only if it makes the structure harder to predict.
     """
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
-    w, at, torques = post.mean * ex.data.scale[post.columns], ex.data.nuisances, {}
-    for index in ex.chosen:
-        c = ex.data.candidates[index]
-        part = slice(at, at + len(c.columns))
-        at += len(c.columns)
+    w, torques = post.mean * ex.data.scale[post.columns], {}
+    for index, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
         torque = [s.X[..., post.columns[part]] @ w[part] for s in ex.data.stretches]
         energy = np.sum([np.sum((x / ex.noise.total[r]) ** 2, axis=0) for r, x in enumerate(torque)], axis=0)
-        if not c.effect.silent and energy[j] > ALMOST_ALL * energy.sum():
+        if not ex.data.candidates[index].effect.silent and energy[j] > ALMOST_ALL * energy.sum():
             torques[index] = rows.of([x[:, j] for x in torque])
     out, y = [], rows.residual
     for index in sorted(torques, key=lambda i: float(np.sum(torques[i] ** 2))):
