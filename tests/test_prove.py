@@ -73,7 +73,7 @@ def test_a_set_is_weighted_by_the_noise_that_it_leaves(alike):
     fewer = alike.chosen[:-1]
     again = explained_by(explained_by(alike, fewer), alike.chosen)
     assert again.noise_of == alike.chosen
-    np.testing.assert_allclose(again.noise.total, alike.noise.total, rtol=0.01)
+    np.testing.assert_allclose(again.noise.total, alike.noise.total, rtol=0.03)
 
 
 def test_sums_over_windows_gain_what_the_windows_themselves_gain():

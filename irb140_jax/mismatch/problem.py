@@ -42,7 +42,7 @@ class Problem:
     Attributes:
         H: Gram matrix over [nuisances | amplitudes | y], nuisances eliminated, shape (K + 1, K + 1).
         per_joint: Gram matrices of each joint's rows before elimination, shape (n, K + 1, K + 1).
-        torque_energy: Squared whitened logged torque of each recording (one stretch each) and joint, shape (recordings, n).
+        torque_energy: Squared whitened logged torque of each recording (one stretch) and joint, shape (recordings, n).
         candidates: What may be in the set.
         offset: Column of the first amplitude.
         log_prior: Log prior odds of each candidate beside its rivals, shape (len(candidates),).
