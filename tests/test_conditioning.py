@@ -16,7 +16,7 @@ from irb140_jax.recordings.condition import choose_band, condition, conditioned
 from irb140_jax.recordings.direction import direction_of
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.smooth import _signal_share
+from irb140_jax.recordings.smooth import signal_share
 
 BAND = Band(torque=15.0, position=24.0, rate=200.0, step=5)
 RATE = 500.0  # Hz of the logs
@@ -371,7 +371,7 @@ def test_noise_is_no_motion_at_frequencies_where_it_happens_to_be_strong(duratio
     shares = []
     for seed in range(30):
         q = np.sin(2.0 * np.pi * 0.7 * t) + 2e-5 * np.random.default_rng(seed).normal(size=len(t))
-        share, _, f = _signal_share(q, 0.0, RATE)
+        share, _, f = signal_share(q, 0.0, RATE)
         shares.append(share[f > 5.0].max())
     assert np.max(shares) == 0.0
 
@@ -380,7 +380,7 @@ def test_weak_motion_above_a_band_without_any_is_kept():
     t = times(15.0)
     weak = np.sin(2.0 * np.pi * 12.0 * t) + np.random.default_rng(0).normal(size=len(t))
     q = np.sin(2.0 * np.pi * 0.7 * t) + 2e-5 * weak
-    share, _, f = _signal_share(q, 0.0, RATE)
+    share, _, f = signal_share(q, 0.0, RATE)
     assert share[np.argmin(np.abs(f - 12.0))] > 0.9 and share[(f > 14.0) & (f < 100.0)].max() == 0.0
 
 

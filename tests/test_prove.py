@@ -1,5 +1,7 @@
 """What counts as proof on unseen data, where some of the data are the only ones to tell of something."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from helpers_recordings import recording, robot
@@ -7,8 +9,8 @@ from helpers_recordings import recording, robot
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
 from irb140_jax.mismatch import prove
-from irb140_jax.mismatch.explain import Explanation, explain, explained_by
-from irb140_jax.mismatch.prove import folds, held_out, lasting, refitted
+from irb140_jax.mismatch.explain import Explanation, explain, explained_by, full_posterior, parts
+from irb140_jax.mismatch.prove import folds, held_out, lasting, refitted, scatter
 from irb140_jax.recordings.condition import choose_band, condition
 
 FRICTION = tuple(CATALOGUE[slug] for slug in ("coulomb_friction", "viscous_friction"))
@@ -59,6 +61,38 @@ def test_an_amplitude_must_exceed_what_it_scatters_by(alike, monkeypatch):
 
     monkeypatch.setattr(prove, "scatter", overwhelming)
     assert lasting(alike).chosen == tuple(i for i in alike.chosen if i != least)
+
+
+def deviations(ex: Explanation, one: int) -> float:
+    """Of white noise, by which a finding of one amplitude is off nothing."""
+    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    at = parts(ex.data, ex.chosen)[ex.chosen.index(one)].start
+    return float(abs(post.mean[at]) / np.sqrt(post.cov[at, at]))
+
+
+@pytest.mark.parametrize("beyond", [True, False])
+def test_of_what_is_late_only_what_is_beyond_the_bound_counts(alike, beyond):
+    one = next(i for i in alike.chosen if alike.data.candidates[i].slug == "viscous_friction")
+    widest = deviations(alike, one) / np.sqrt(3.0)  # a bound that anything up to is equally likely
+    bounds = np.zeros(len(alike.data.candidates))
+    bounds[one] = widest * (0.2 if beyond else 0.9)
+    late = dataclasses.replace(alike.problem)
+    vars(late)["imitated"] = bounds
+    assert (one in lasting(dataclasses.replace(alike, problem=late)).chosen) == beyond
+
+
+def test_the_only_block_that_tells_of_something_is_no_sample_of_its_scatter(alike):
+    one, told = max(alike.chosen, key=lambda i: deviations(alike, i)), 7
+    column, blocks = alike.problem.columns((one,)), alike.grams.blocks.copy()
+    silent = np.arange(len(blocks)) != told
+    blocks[np.ix_(silent, column, np.arange(blocks.shape[2]))] = 0.0
+    blocks[np.ix_(silent, np.arange(blocks.shape[1]), column)] = 0.0
+    touched_once = dataclasses.replace(alike, grams=dataclasses.replace(alike.grams, blocks=blocks))
+    part = parts(alike.data, alike.chosen)[alike.chosen.index(one)]
+    spared, counted = (scatter(touched_once, [yes] * len(alike.chosen))[part].max() for yes in (True, False))
+    # Left out with its block, the amplitude falls to nothing: that is what is not known then, and no contradiction.
+    assert spared < 2.0
+    assert counted > 0.5 * deviations(touched_once, one) > spared
 
 
 def test_where_nothing_is_named_what_is_corrected_is_the_refit(alike):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.unknown import Rows, _scores, competitors
+from irb140_jax.mismatch.unknown import Rows, competitors, predicted
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import three_motions
@@ -78,4 +78,4 @@ def test_what_one_recording_leaves_is_seen_to_go_with_time_however_much_louder_i
     )
     time = competitors([one, one], 0, rows, ("hinge",))[-1]
     assert time.variable.startswith("time")
-    assert 0.4 < _scores(time, rows.residual[:, None])[0] < 0.6  # all of one recording, nothing of the other
+    assert 0.4 < predicted(time, rows.residual[:, None])[0] < 0.6  # all of one recording, nothing of the other

@@ -107,7 +107,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
         if len(rows.residual) < 200 or least > 1.0:
             continue
         rivals = competitors(ex.data.stretches, j, rows, ex.lib.robot.joint_names)
-        shares = np.array([_scores(c, rows.residual[:, None])[0] for c in rivals])
+        shares = np.array([predicted(c, rows.residual[:, None])[0] for c in rivals])
         if shares.max() < least:
             continue
         null = _null(rivals, rows)
@@ -232,7 +232,7 @@ def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
     return Competitor("time, more than any motion", phi, np.concatenate(folds), False)
 
 
-def _scores(c: Competitor, Y: np.ndarray) -> np.ndarray:
+def predicted(c: Competitor, Y: np.ndarray) -> np.ndarray:
     """Share of each column's variance that ridge regression on the features predicts on left-out folds."""
     return 1.0 - _missed(c, Y) / np.maximum(np.sum(Y**2, axis=0), 1e-300)
 
@@ -260,7 +260,7 @@ def _null(rivals: list[Competitor], rows: Rows) -> np.ndarray:
         at = np.flatnonzero(rows.recording == r)
         for k in range(SHIFTS):
             copies[at, k] = np.roll(rows.residual[at], rng.integers(len(at) // 10, max(len(at) - len(at) // 10, 2)))
-    return np.max([_scores(c, copies) for c in rivals if c.shifts], axis=0)
+    return np.max([predicted(c, copies) for c in rivals if c.shifts], axis=0)
 
 
 def _centred(y: np.ndarray, constant: np.ndarray) -> np.ndarray:
@@ -289,7 +289,7 @@ def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: fl
         own, without = (_centred(x, level) for x in (torques[index] * level, y + torques[index] * level))
         ratio = size / np.sqrt(np.mean(torques[index] ** 2))
         error = _missed(carrier, without[:, None])[0] / _missed(carrier, y[:, None])[0]
-        form = ratio > 1.0 or _scores(carrier, own[:, None])[0] > SAME
+        form = ratio > 1.0 or predicted(carrier, own[:, None])[0] > SAME
         law = ex.data.candidates[index].effect
         sure = law.ordinary and any(ex.data.candidates[i].effect.friction for i in torques if i != index)
         form = form if not law.ordinary else ratio > LARGE and held_out_gain(ex, index)[0] < LITTLE

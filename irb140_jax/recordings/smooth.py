@@ -45,7 +45,7 @@ def without_noise(
     out, noise = np.empty((len(q) + 2 * half, q.shape[1])), np.zeros(q.shape[1])
     f = np.fft.rfftfreq(len(q) + 2 * reach, 1.0 / rate)
     for j in range(q.shape[1]):
-        share, floor, at = _signal_share(q[:, j], white[j] if resampled else 0.0, rate)
+        share, floor, at = signal_share(q[:, j], white[j] if resampled else 0.0, rate)
         longer = _goes_on(q[:, j], rate, reach, np.interp(f, at, share))
         out[:, j] = longer[reach - half : reach + len(q) + half]
         response = np.abs(np.fft.rfft(h1, 8192)) * np.interp(np.fft.rfftfreq(8192, 1.0 / rate), at, share)
@@ -87,7 +87,7 @@ def _acceleration(x: np.ndarray, rate: float) -> float:
     return float(a * max(1.0 - variance / max(a**2, 1e-300), 0.0) * (rate / count) ** 2)
 
 
-def _signal_share(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, float, np.ndarray]:
+def signal_share(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, float, np.ndarray]:
     """Share of the signal in a position's power at each frequency, density of its white noise, frequencies [Hz]."""
     f, p, floor = spectrum_of(x, density, rate)
     smooth = np.maximum(ndimage.uniform_filter1d(p, BINS, mode="nearest"), 1e-300)
