@@ -92,8 +92,8 @@ def test_a_planted_breach_in_an_effect_is_found(source):
     "source",
     [
         "from irb140_jax.dynamics import regressor",
-        "from irb140_jax.effects.base import Motion",
-        "from . import base",
+        "from irb140_jax.effects.motion import Motion",
+        "from . import motion",
         "import jax",
     ],
 )

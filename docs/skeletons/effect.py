@@ -3,7 +3,8 @@
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.motion import of_site
 
 
 class QuadraticDrag(AbstractEffect):

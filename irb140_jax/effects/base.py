@@ -9,90 +9,18 @@ report, the corrected model, the docs table and the contract tests.
 import abc
 from typing import ClassVar, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from irb140_jax.effects.grids import Scales, between_neighbours
 from irb140_jax.effects.left_over import LeftOver
+from irb140_jax.effects.motion import Motion
 from irb140_jax.robot import Robot
-from irb140_jax.types import Joints, JointSamples, Samples, Scalar
 
 # Times the torque that the shape of a simulated link accounts for: beyond, it stands in for something else, as a spring
 # of a quarter of its bend does for what smoothing takes off accelerations.
 ALIKE = 2.0
-
-
-class RigidBody(eqx.Module):
-    """Sensitivities of the nominal rigid body's torque along a motion.
-
-    Attributes:
-        by_gravity: Torque per unit of each component of gravity in base axes [N m s^2/m], shape (T, n, 3).
-        gravity: Size of gravity [m/s^2], shape ().
-        across: Two unit vectors across gravity in base axes, shape (2, 3).
-        held: Torque per inertial parameter of a body held by the last link, about the tool, shape (T, n, 10).
-        by_q, by_qd: Derivatives of the torque by joint positions and velocities, shape (T, n, n), torque first.
-        spring: Stiffness of the model's own springs, shape (n,).
-        mass: Joint-space mass matrix, links only, shape (T, n, n).
-        tool: Position of the tool in the world [m], shape (T, 3).
-        tool_jacobian: Velocity of the tool per joint speed, world axes [m or 1], shape (T, n, 3).
-    """
-
-    by_gravity: Float[Array, "T n 3"]
-    gravity: Float[Array, ""]
-    across: Float[Array, "2 3"]
-    held: Float[Array, "T n 10"]
-    by_q: Float[Array, "T n n"]
-    by_qd: Float[Array, "T n n"]
-    spring: Joints
-    mass: Float[Array, "T n n"]
-    tool: Float[Array, "T 3"]
-    tool_jacobian: Float[Array, "T n 3"]
-
-
-class Motion(eqx.Module):
-    """What an effect may look at: a motion and the torque the model transmits along it.
-
-    Attributes:
-        t: Time since the recording began [s], shape (T,).
-        q, qd, qdd: Joint positions, velocities, accelerations, shape (T, n).
-        load: Torque the transmissions carry: rigid body and all but friction [N m or N], shape (T, n).
-        total: Torque the motors give: load and friction [N m or N], shape (T, n).
-        carried: What the links alone would need on the motors' path: no rotors, stiff gears [N m or N], shape (T, n).
-        scaled_rate: Time derivative of the total torque by the log's torque constants, shape (T, n).
-        asked_rate: Time derivative of what the log would show if its clocks were right: lags too, shape (T, n).
-        rigid: What the rigid body does along the motion.
-        rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
-        direction: sign(qd), and between two signs what friction does while a joint sticks, shape (T, n).
-        recording: Number of the recording, from 0; below 0 for motion that the diagnosis did not see, shape ().
-    """
-
-    t: Samples
-    q: JointSamples
-    qd: JointSamples
-    qdd: JointSamples
-    load: JointSamples
-    total: JointSamples
-    carried: JointSamples
-    scaled_rate: JointSamples
-    asked_rate: JointSamples
-    rigid: "RigidBody"
-    rest_speed: Joints
-    direction: JointSamples
-    recording: Scalar
-
-
-class Scales(NamedTuple):
-    """Sizes of a set of recordings, for grids of shape parameters; each of shape (n,)."""
-
-    speed: np.ndarray  # largest speed of each joint [rad/s or m/s]
-    rest_speed: np.ndarray  # speed the encoders can't tell from rest
-    torque: np.ndarray  # RMS of the logged torque [N m or N]
-    low: np.ndarray  # lowest and highest position [rad or m]
-    high: np.ndarray
-    duration: float  # of the longest recording [s]
-    inertia: np.ndarray  # mean inertia of the links about each joint, without rotors [kg m^2 or kg]
-    q_noise: np.ndarray  # standard deviation of the encoders' white noise [rad or m]
 
 
 class Parameter(NamedTuple):
@@ -339,28 +267,3 @@ class AbstractEffect(abc.ABC):
     def unit(self, parameter: Parameter, is_slide: bool) -> str:
         """The parameter's unit for a hinge or a slide."""
         return parameter.unit.format(tau="N" if is_slide else "N m", q="m" if is_slide else "rad")
-
-
-def of_site(array: JointSamples, joints: Int[Array, " m"]) -> Float[Array, "T m"]:
-    """The columns of a (T, n) array that belong to the joints of a site."""
-    return jnp.take(array, joints, axis=1)
-
-
-def between_neighbours(grid: np.ndarray, best: np.ndarray, *, beyond: bool = False) -> np.ndarray:
-    """As many grid points of one parameter, in equal ratios, between the neighbours of the best, shape (points, 1).
-
-    Args:
-        grid: As it was, shape (points, 1).
-        best: Its best point, shape (1,).
-        beyond: Whether an end of the grid has a neighbour outside of it.
-    """
-    values = np.sort(grid[:, 0])
-    if beyond:
-        values = np.array([values[0] ** 2 / values[1], *values, values[-1] ** 2 / values[-2]])
-    at = int(np.argmin(np.abs(values - best[0])))
-    return np.geomspace(values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)], len(grid))[:, None]
-
-
-def geometric_grid(low: float, high: float, points: int) -> np.ndarray:
-    """Grid of one shape parameter, equal ratios from low to high, shape (points, 1)."""
-    return np.geomspace(low, max(high, low * 1.001), points)[:, None]

@@ -4,7 +4,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from irb140_jax.effects.base import ALIKE, AbstractEffect, Parameter, geometric_grid
+from irb140_jax.effects.base import ALIKE, AbstractEffect, Parameter
+from irb140_jax.effects.grids import geometric_grid
 
 DAMPING = 0.05  # of the link on its spring, relative to critical: what harmonic drives show (Spong; Tuttle and Seering)
 MODES = (6.0, 80.0)  # Hz; softer is no robot, stiffer moves nothing below 20 Hz

@@ -3,7 +3,9 @@
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter, between_neighbours, of_site
+from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.grids import between_neighbours
+from irb140_jax.effects.motion import of_site
 
 
 class NonlinearViscousFriction(AbstractEffect):

@@ -5,8 +5,9 @@ import itertools
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.base import AbstractEffect, Parameter
 from irb140_jax.effects.coulomb_friction import dry_friction_columns
+from irb140_jax.effects.motion import of_site
 from irb140_jax.effects.native import with_joint
 
 CENTRES, WIDTHS = 8, 3  # grid points of the two shape parameters

@@ -3,7 +3,9 @@
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter, geometric_grid, of_site
+from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.grids import geometric_grid
+from irb140_jax.effects.motion import of_site
 from irb140_jax.effects.native import with_joint
 
 

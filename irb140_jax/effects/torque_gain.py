@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.motion import of_site
 from irb140_jax.effects.native import with_gear
 
 LARGEST = 1.5  # torque constants are known better than that; a model's torque full of noise feigns larger gains

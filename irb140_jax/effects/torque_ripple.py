@@ -3,7 +3,8 @@
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter, of_site
+from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.motion import of_site
 
 POINTS = 10  # cycle numbers in the search at once
 FEWEST_PERIODS = 2.0  # in the range of the joint: less than that is any curve, and repeats nothing

@@ -5,7 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects import AbstractEffect
-from irb140_jax.effects.base import Parameter, geometric_grid, of_site
+from irb140_jax.effects.base import Parameter
+from irb140_jax.effects.grids import geometric_grid
+from irb140_jax.effects.motion import of_site
 
 LEADS = (0.0, 0.0095)  # s before the joint: a plain simulator's, and MuJoCo's by default
 CREEPS = 12

@@ -1,0 +1,38 @@
+"""Grids of shape parameters: the sizes they are made for, and how they are laid out."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Scales(NamedTuple):
+    """Sizes of a set of recordings, for grids of shape parameters; each of shape (n,)."""
+
+    speed: np.ndarray  # largest speed of each joint [rad/s or m/s]
+    rest_speed: np.ndarray  # speed the encoders can't tell from rest
+    torque: np.ndarray  # RMS of the logged torque [N m or N]
+    low: np.ndarray  # lowest and highest position [rad or m]
+    high: np.ndarray
+    duration: float  # of the longest recording [s]
+    inertia: np.ndarray  # mean inertia of the links about each joint, without rotors [kg m^2 or kg]
+    q_noise: np.ndarray  # standard deviation of the encoders' white noise [rad or m]
+
+
+def between_neighbours(grid: np.ndarray, best: np.ndarray, *, beyond: bool = False) -> np.ndarray:
+    """As many grid points of one parameter, in equal ratios, between the neighbours of the best, shape (points, 1).
+
+    Args:
+        grid: As it was, shape (points, 1).
+        best: Its best point, shape (1,).
+        beyond: Whether an end of the grid has a neighbour outside of it.
+    """
+    values = np.sort(grid[:, 0])
+    if beyond:
+        values = np.array([values[0] ** 2 / values[1], *values, values[-1] ** 2 / values[-2]])
+    at = int(np.argmin(np.abs(values - best[0])))
+    return np.geomspace(values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)], len(grid))[:, None]
+
+
+def geometric_grid(low: float, high: float, points: int) -> np.ndarray:
+    """Grid of one shape parameter, equal ratios from low to high, shape (points, 1)."""
+    return np.geomspace(low, max(high, low * 1.001), points)[:, None]
