@@ -9,7 +9,8 @@ from helpers_recordings import recording, robot
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
 from irb140_jax.mismatch import prove
-from irb140_jax.mismatch.explain import Explanation, explain, explained_by, full_posterior, parts
+from irb140_jax.mismatch.explain import explain
+from irb140_jax.mismatch.explanation import Explanation, explained_by, full_posterior, parts
 from irb140_jax.mismatch.prove import folds, held_out, lasting, refitted, scatter
 from irb140_jax.recordings.condition import choose_band, condition
 

@@ -7,6 +7,7 @@ import numpy as np
 from scipy import optimize
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.grids import top_of_parabola
 
 NORMALS = 128  # directions of the first scan, some 16 degrees apart
 SHARES = (0.02, 0.05, 0.1, 0.2, 0.35)  # of the samples behind the wall, in the first scan
@@ -57,8 +58,8 @@ class Contact(AbstractEffect):
         # Turns and shift about the place of contact hardly mix: the top of a parabola through each three points.
         if not np.all(np.isfinite(odds)) or np.any(grid[0] != best):
             return best
-        moved = sum(_top(odds[0], odds[i], odds[i + 1]) * 0.5 * (grid[i + 1] - grid[i]) for i in (1, 3))
-        top = best + moved + _top(odds[0], odds[6], odds[5]) * (grid[5] - best)
+        moved = sum(top_of_parabola(odds[i], odds[0], odds[i + 1]) * 0.5 * (grid[i + 1] - grid[i]) for i in (1, 3))
+        top = best + moved + top_of_parabola(odds[6], odds[0], odds[5]) * (grid[5] - best)
         return np.append(top[:3] / np.linalg.norm(top[:3]), top[3])
 
     def finer(self, grid, best):
@@ -134,12 +135,6 @@ def _around(best, turns, tilt, shift):
     turned = np.array([best + tilt * s * turn for turn in turns for s in (-1.0, 1.0)])
     turned[:, :3] /= np.linalg.norm(turned[:, :3], axis=1, keepdims=True)
     return np.array([best, *turned, best + [0, 0, 0, shift], best - [0, 0, 0, shift]])
-
-
-def _top(middle, low, high):
-    """Where the parabola through values at -1, 0 and 1 is highest, between -1 and 1; 0 where it is flat."""
-    bend = 2.0 * middle - low - high
-    return float(np.clip(0.5 * (high - low) / bend, -1.0, 1.0)) if bend > 0.0 else 0.0
 
 
 def _wall(tool, tool_jacobian, shape, xp):

@@ -33,6 +33,34 @@ def between_neighbours(grid: np.ndarray, best: np.ndarray, *, beyond: bool = Fal
     return np.geomspace(values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)], len(grid))[:, None]
 
 
+def top_of_parabola(low: float, middle: float, high: float) -> float:
+    """Where the parabola through values at -1, 0 and 1 is highest, between -1 and 1; 0 where it is flat."""
+    bend = 2.0 * middle - low - high
+    return float(np.clip(0.5 * (high - low) / bend, -1.0, 1.0)) if bend > 0.0 else 0.0
+
+
+def nearest_in_each_direction(grid: np.ndarray, best: np.ndarray) -> list[np.ndarray]:
+    """Points beside one of a grid, the nearest first, for each direction in which the grid has any.
+
+    Args:
+        grid: Shape (points, shape parameters).
+        best: The point, shape (shape parameters,).
+
+    Returns:
+        Indices of the points on either side, of each direction that is not made up of those before.
+    """
+    offsets = (grid - best) / np.maximum(np.ptp(grid, axis=0), 1e-300)
+    length = np.linalg.norm(offsets, axis=1)
+    order, out, beyond = np.argsort(length, kind="stable"), [], np.eye(len(best))
+    for i in order[length[order] > 0.0]:
+        rest = beyond @ offsets[i]
+        if np.linalg.norm(rest) > 0.5 * length[i]:
+            along = np.abs(offsets[order] @ offsets[i]) > 0.999 * length[order] * length[i]
+            out.append(order[along & (length[order] > 0.0)])
+            beyond = beyond - np.outer(rest, rest) / (rest @ rest)
+    return out
+
+
 def geometric_grid(low: float, high: float, points: int) -> np.ndarray:
     """Grid of one shape parameter, equal ratios from low to high, shape (points, 1)."""
     return np.geomspace(low, max(high, low * 1.001), points)[:, None]

@@ -7,6 +7,7 @@ import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
 from irb140_jax.effects.coulomb_friction import dry_friction_columns
+from irb140_jax.effects.grids import top_of_parabola
 from irb140_jax.effects.motion import of_site
 from irb140_jax.effects.native import with_joint
 
@@ -48,11 +49,21 @@ class PositionDependentFriction(AbstractEffect):
     def refines(self):
         return True
 
+    def peak(self, grid, best, odds):
+        # Widths are few and far apart: the top of a parabola through three points in each direction.
+        axes = grid[::WIDTHS, 0], np.log(grid[:WIDTHS, 1])
+        odds = odds.reshape(CENTRES, WIDTHS)
+        i, k = (int(np.argmin(np.abs(axis - x))) for axis, x in zip(axes, (best[0], np.log(best[1])), strict=True))
+        centre, width = _top(axes[0], odds[:, k], i), _top(axes[1], odds[i], k)
+        return np.array([centre, np.exp(width)])
+
     def finer(self, grid, best):
-        centres, widths = np.unique(grid[:, 0]), np.unique(grid[:, 1])
-        step = np.min(np.diff(centres)) if len(centres) > 1 else best[1]
-        ratio = np.sqrt(widths[1] / widths[0]) if len(widths) > 1 else 1.1
-        near = best[0] + step * np.linspace(-1.0, 1.0, CENTRES)
+        centres, widths = grid[::WIDTHS, 0], grid[:WIDTHS, 1]
+        step = centres[1] - centres[0]
+        ratio = np.sqrt(widths[1] / widths[0])
+        if widths[0] < best[1] < widths[-1]:  # the peak between its neighbours
+            ratio = np.sqrt(ratio)
+        near = best[0] + 0.25 * step * np.arange(-(CENTRES // 2), CENTRES - CENTRES // 2)
         return np.array(list(itertools.product(near, best[1] * np.geomspace(1 / ratio, ratio, WIDTHS))))
 
     def columns(self, motion, joints, shape):
@@ -77,3 +88,11 @@ class PositionDependentFriction(AbstractEffect):
             f"{names}: friction of {values['coulomb']:.3g} {units['coulomb']} changes by "
             f"{100 * values['depth']:.3g} % around {values['centre']:.3g} {units['centre']}"
         )
+
+
+def _top(values, odds, at):
+    """Where odds at equally spaced values are best, to a fraction of a step, about the best of them."""
+    near = odds[max(at - 1, 0) : at + 2]
+    if len(near) < 3 or not np.all(np.isfinite(near)):
+        return values[at]
+    return values[at] + top_of_parabola(*near) * (values[1] - values[0])

@@ -12,7 +12,8 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
-from irb140_jax.mismatch.explain import Explanation, explain, explained_by, fitted, full_posterior
+from irb140_jax.mismatch.explain import explain
+from irb140_jax.mismatch.explanation import Explanation, explained_by, fitted, full_posterior
 from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, lasting, refitted, transferring
@@ -98,16 +99,11 @@ def _diagnosed(
     ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, progress)
     progress("proving on data that the fit did not see")
     ex = lasting(transferring(ex))
-    refit = refitted(ex)
-    proof = held_out(ex, refit)
-    progress("looking for structure that no effect explains")
-    rest = unexplained(ex, proof)
+    refit, proof, rest = _proved(ex, progress)
     doubtful = {c for u in rest for c in u.doubtful}
     if doubtful:  # names that only stand in for what has none
         ex = explained_by(ex, tuple(c for c in ex.chosen if c not in doubtful))
-        refit = refitted(ex)
-        proof = held_out(ex, refit)
-        rest = unexplained(ex, proof)
+        refit, proof, rest = _proved(ex, progress)
     found = findings(robot, ex)
     model = _model(robot, ex, refit, band)
     matters = reference(ex.lib, ex.scales, band.rate)
@@ -115,6 +111,14 @@ def _diagnosed(
     diagnosis = _document(robot, ex, proof, found, rest, recordings, seen)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     return Result(diagnosis, model, _views(robot, ex, proof, model, recordings, smooth, diagnosis), open_)
+
+
+def _proved(ex: Explanation, progress: Callable[[str], None]) -> tuple[Refit, HeldOut, list[Unexplained]]:
+    """The refit beside an explanation, both on data that they did not see, and what is left without a name."""
+    refit = refitted(ex)
+    proof = held_out(ex, refit)
+    progress("looking for structure that no effect explains")
+    return refit, proof, unexplained(ex, proof)
 
 
 def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band) -> CorrectedModel:

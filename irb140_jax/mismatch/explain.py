@@ -6,16 +6,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from irb140_jax.effects import AbstractEffect, Scales
+from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
 from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble, first_noise, problem
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
-from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
+from irb140_jax.mismatch.explanation import Explanation, explained_by, fitted, full_posterior, noise_under, parts
 from irb140_jax.mismatch.model import Named, better_known, composed
 from irb140_jax.mismatch.name import guessed, search
-from irb140_jax.mismatch.noise import Noise, noise_from_residuals
+from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
-from irb140_jax.mismatch.problem import Problem
-from irb140_jax.mismatch.rows import Stretch, stretch
+from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
 from irb140_jax.mismatch.silent import SoftFriction
 from irb140_jax.mismatch.tangent import Point, point
@@ -24,45 +24,9 @@ from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
 WEIGHTLESS = 0.43  # standard deviations of a payload's mass: with less, the odds that there is any are below two to one
-SETTLED = 2  # rounds in which the noise and what leaves it agree
-PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both
-
-
-@dataclasses.dataclass(frozen=True)
-class Explanation:
-    """What explains the recordings, and everything needed to judge it.
-
-    Attributes:
-        lib: The library in its last state: refined shapes.
-        scales: Sizes of the recordings.
-        data: Low-passed rows.
-        noise: Whitening under the explanation.
-        noise_of: Indices of the candidates that leave this noise.
-        problem: Search problem.
-        grams: Gram matrices by block.
-        chosen: Indices of the candidates in the explanation.
-        factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
-    """
-
-    lib: Library
-    scales: Scales
-    data: Data
-    noise: Noise
-    noise_of: tuple[int, ...]
-    problem: Problem
-    grams: Grams
-    chosen: tuple[int, ...]
-    factor: np.ndarray
-
-    @property
-    def members(self) -> list:
-        """The chosen candidates."""
-        return [self.data.candidates[c] for c in self.chosen]
-
-    def columns(self, chosen: tuple[int, ...] | None = None) -> np.ndarray:
-        """Columns of the full model: inertials, then the amplitudes of the chosen candidates."""
-        chosen = self.chosen if chosen is None else chosen
-        return np.concatenate([np.arange(self.data.nuisances), self.problem.columns(chosen)])
+PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both ...
+MOST_PASSES = 5  # ... unless a shape is known far better than its grid is fine:
+COARSE = 100.0  # its best point stands alone by so much in log odds, and a law that is a little off leaves as much
 
 
 def explain(
@@ -109,16 +73,18 @@ def explain(
         progress(f"searching sets of explanations (round {turn})")
         return _settled(lib, scales, data, factor, chosen, noise, blocks, settled=turn > 1)
 
-    for turn in range(1, PASSES):
+    turn, coarse = 1, False
+    while turn < PASSES or (coarse and turn < MOST_PASSES):
         ex = explained(turn, blocks=1)
         found = fitted(ex.data, full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), ex.chosen, factor)
         named = _named(found)
         better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), named)
         along, at = [seen_by(better, r) for r in along], point(robot, found[0], named)
         loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
-        (lib, chosen), noise = _refined(ex), ex.noise
+        (lib, chosen), noise, coarse = _refined(ex), ex.noise, _coarse(ex)
+        turn += 1
         del ex  # hundreds of megabytes, before the next
-    ex = _of_some_weight(explained(PASSES, BLOCKS))
+    ex = _of_some_weight(explained(turn, BLOCKS))
     # The last search may have found another set than that whose noise it was weighted by.
     return explained_by(ex, ex.chosen)
 
@@ -135,7 +101,7 @@ def _settled(
     for find in rounds:
         prob, g = problem(data, noise, blocks=1, settled=settled)
         chosen = find(prob, chosen)
-        noise = _noise_under(data, prob, chosen, noise, rounds=1)
+        noise = noise_under(data, prob, chosen, noise, rounds=1)
         del prob, g  # hundreds of megabytes, before the next are made
     prob, g = problem(data, noise, blocks, settled=settled)
     return Explanation(lib, scales, data, noise, chosen, prob, g, search(prob, chosen), factor)
@@ -155,72 +121,6 @@ def _of_some_weight(ex: Explanation) -> Explanation:
     return dataclasses.replace(ex, problem=prob, chosen=search(prob, tuple(i for i in ex.chosen if not none[i])))
 
 
-def explained_by(ex: Explanation, chosen: tuple[int, ...]) -> Explanation:
-    """The explanation with a set of candidates, weighted by the noise that these leave.
-
-    Where none of them has a name, nothing makes products with the inertials: what is corrected is the refit.
-    """
-    data, named = ex.data, any(ex.data.candidates[i].slug != "inertials" for i in chosen)
-    if set(chosen) == set(ex.noise_of) and (named or all(s.bare for s in data.stretches)):
-        return dataclasses.replace(ex, chosen=chosen)
-    if not named:
-        data = dataclasses.replace(data, stretches=[s.stripped() for s in data.stretches])
-    noise = _noise_under(data, ex.problem, chosen, ex.noise, SETTLED)
-    prob, g = problem(data, noise)
-    prob = dataclasses.replace(prob, lowest=ex.problem.lowest)  # what has no weight has none here
-    return dataclasses.replace(ex, data=data, noise=noise, noise_of=chosen, problem=prob, grams=g, chosen=chosen)
-
-
-def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:
-    """Where each member of a set has its amplitudes in a posterior of inertials and amplitudes."""
-    widths = [len(data.candidates[i].columns) for i in chosen]
-    ends = data.nuisances + np.cumsum(widths, dtype=int)
-    return [slice(int(end) - width, int(end)) for end, width in zip(ends, widths, strict=True)]
-
-
-def full_posterior(data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without=None) -> Posterior:
-    """Posterior of inertials and chosen amplitudes, in prior units."""
-    columns, named = _columns(data, prob, chosen)
-    post = posterior(g.of(columns).total(without), np.arange(len(columns)), named)
-    return dataclasses.replace(post, columns=columns)
-
-
-def noise_left(
-    stretches: list[Stretch], scale: np.ndarray, named: list[slice], noise: Noise, rounds: int = SETTLED
-) -> Noise:
-    """Noise that columns leave, fitted under noise that was guessed before, and again under what they leave.
-
-    Args:
-        stretches: With these columns alone.
-        scale: Their prior standard deviations.
-        named: Those of each named effect; see `posterior`.
-        noise: The guess.
-        rounds: How often.
-    """
-    every, n = np.arange(len(scale)), stretches[0].y.shape[1]
-    use, unsure = [s.use for s in stretches], [s.unsure for s in stretches]
-    for _ in range(rounds):
-        post = posterior(grams(stretches, noise, scale, len(scale), 1).total(), every, named)
-        residuals = [s.y - s.X @ (post.mean * scale) for s in stretches]
-        # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
-        used = len(scale) - float(np.trace(post.cov))
-        noise = noise_from_residuals(residuals, use, np.full(n, used / n), unsure)
-    return noise
-
-
-def _noise_under(data: Data, prob: Problem, chosen: tuple[int, ...], noise: Noise, rounds: int) -> Noise:
-    columns, named = _columns(data, prob, chosen)
-    stretches = [dataclasses.replace(s, X=s.X[..., columns]) for s in data.stretches]
-    return noise_left(stretches, data.scale[columns], named, noise, rounds)
-
-
-def _columns(data: Data, prob: Problem, chosen: tuple[int, ...]) -> tuple[np.ndarray, list[slice]]:
-    """Columns of inertials and chosen amplitudes, and which of those are each named effect's."""
-    each = zip(chosen, parts(data, chosen), strict=True)
-    named = [part for i, part in each if data.candidates[i].slug != "inertials"]
-    return np.concatenate([np.arange(data.nuisances), prob.columns(chosen)]), named
-
-
 def _named(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
     """The effects of an explanation (see `fitted`) with their numbers."""
     _, members, amplitudes = found
@@ -233,22 +133,6 @@ def _loads(lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarr
     return composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi).loads
 
 
-def fitted(
-    data: Data, post: Posterior, chosen: tuple[int, ...], factor: np.ndarray
-) -> tuple[np.ndarray, list[Candidate], list[np.ndarray]]:
-    """Shift of the inertial parameters (10 n,), and the named effects with their amplitudes, from a posterior."""
-    w = post.mean * data.scale[post.columns]
-    dphi, members, amplitudes = factor @ w[: data.nuisances], [], []
-    for i, part in zip(chosen, parts(data, chosen), strict=True):
-        c = data.candidates[i]
-        if c.slug == "inertials":
-            dphi = dphi + factor[:, 10 * c.joints[0] : 10 * c.joints[0] + 10] @ w[part]
-        else:
-            members.append(c)
-            amplitudes.append(w[part])
-    return dphi, members, amplitudes
-
-
 def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
     """Finer grids of shapes around the chosen ones, and grids that the residual suggests."""
     left = left_over(ex.data, ex.columns(), ex.noise.total)
@@ -258,7 +142,7 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
         for s, joints in enumerate(sites):
             mine = [m for m in ex.members if m.slug == effect.slug and m.joints == tuple(joints)]
             if mine and effect.refines():
-                new[s] = effect.finer(old[s], _peak(ex, mine[0], old[s]))
+                new[s] = effect.finer(old[s], _peak(ex, mine[0]))
             elif effect.scouts and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)
@@ -266,12 +150,31 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
     return refined, tuple(_same(c, refined, ex.data) for c in ex.chosen)
 
 
-def _peak(ex: Explanation, mine: Candidate, grid: np.ndarray) -> np.ndarray:
+def _coarse(ex: Explanation) -> bool:
+    """Whether the shape of a member is known so well that in some direction its grid has no other point that can be."""
+    for mine in ex.members:
+        if mine.effect.refines():
+            grid, odds = _grid_of(ex, mine)
+            best = odds[np.argmin(np.abs(grid - mine.shape).sum(axis=1))]
+            for points in nearest_in_each_direction(grid, mine.shape):
+                beside = np.sort(odds[points][np.isfinite(odds[points])])[-2:]  # the best may be midway between two
+                if len(beside) and best - beside[0] > COARSE:
+                    return True
+    return False
+
+
+def _peak(ex: Explanation, mine: Candidate) -> np.ndarray:
     """Where a member's grid is at its best beside the other members, to a fraction of its steps."""
+    grid, odds = _grid_of(ex, mine)
+    return mine.effect.peak(grid, mine.shape, odds)
+
+
+def _grid_of(ex: Explanation, mine: Candidate) -> tuple[np.ndarray, np.ndarray]:
+    """A member's grid, shape (points, shape parameters), and log odds of its points beside the other members."""
     candidates, site = ex.data.candidates, (mine.slug, mine.joints, mine.variant)
     same = [i for i, c in enumerate(candidates) if (c.slug, c.joints, c.variant) == site]
     odds = ex.problem.scores(tuple(c for c in ex.chosen if c not in same))[same]
-    return mine.effect.peak(grid, mine.shape, odds)
+    return np.array([candidates[i].shape for i in same]), odds
 
 
 def _same(index: int, lib: Library, data: Data) -> int:

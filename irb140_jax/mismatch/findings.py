@@ -7,7 +7,7 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.explain import Explanation, full_posterior, parts
+from irb140_jax.mismatch.explanation import Explanation, full_posterior, parts
 from irb140_jax.mismatch.intervals import others, parameters_of
 from irb140_jax.mismatch.name import PREFER
 from irb140_jax.mismatch.problem import best_of_groups

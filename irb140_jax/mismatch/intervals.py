@@ -6,8 +6,9 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.explain import Explanation, full_posterior
+from irb140_jax.mismatch.explanation import Explanation, full_posterior
 from irb140_jax.mismatch.scout import left_over
 from irb140_jax.robot import Robot
 
@@ -148,7 +149,8 @@ def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray, widen: flo
     """
     c, data = ex.data.candidates[index], ex.data
     alike = [o for o in data.candidates if (o.slug, o.joints, o.variant) == (c.slug, c.joints, c.variant)]
-    near = _one_a_direction(alike, c.shape)
+    directions = nearest_in_each_direction(np.array([o.shape for o in alike]), c.shape)
+    near = [alike[points[0]] for points in directions]
     if not (c.effect.refines() and near):
         return np.zeros(len(c.effect.parameters))
     columns = np.concatenate([c.columns, *(o.columns for o in near)])
@@ -165,19 +167,6 @@ def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray, widen: flo
     slope = [(_physical(c, w + SMALL * step) - value) / SMALL for step in np.diag(scale[:k])]
     slope += [_physical(o, w) - value for o in near]
     return widen**2 * np.einsum("ip,ij,jp->p", slope, cov, slope)
-
-
-def _one_a_direction(candidates: list[Candidate], shape: np.ndarray) -> list[Candidate]:
-    """The nearest to a shape, one for each direction in which they differ from it."""
-    offsets = np.array([o.shape for o in candidates]) - shape
-    offsets = offsets / np.maximum(np.ptp(offsets, axis=0), 1e-300)
-    chosen, beyond = [], np.eye(len(shape))
-    for i in np.argsort(np.linalg.norm(offsets, axis=1)):
-        rest = beyond @ offsets[i]
-        if np.linalg.norm(rest) > 0.5 * np.linalg.norm(offsets[i]):
-            chosen.append(candidates[i])
-            beyond = beyond - np.outer(rest, rest) / (rest @ rest)
-    return chosen
 
 
 def _variance_over_variants(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:

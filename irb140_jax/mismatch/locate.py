@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy import signal
 
-from irb140_jax.mismatch.explain import Explanation
+from irb140_jax.mismatch.explanation import Explanation
 from irb140_jax.mismatch.prove import HeldOut
 from irb140_jax.robot import Robot
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from irb140_jax.mismatch.assemble import BLOCKS
 from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
-from irb140_jax.mismatch.explain import Explanation, explained_by, full_posterior, noise_left, parts
+from irb140_jax.mismatch.explanation import Explanation, explained_by, full_posterior, noise_left, parts
 from irb140_jax.mismatch.name import ACCEPT, PREFER, possible_beside, simpler
 
 MOST_OF_IT = 0.5  # of what is known of an amplitude, beyond which the block that holds it is no sample of its scatter

@@ -22,6 +22,7 @@ class Stretch:
             units of their prior at relative standard deviation 1.
         y: What the columns should add up to, (R, n): logged minus nominal torque, and what the last explanation says of
             products of its unknowns; see `tangent`.
+        bare: Whether X and y are of the rigid body as it is, without what the last explanation makes of it.
         rigid: Columns of the inertials under the model's own gravity and before the log, (R, n, 10 n).
         tau: Logged torque, low-passed, (R, n).
         nominal: Nominal torque, low-passed, (R, n).
@@ -36,6 +37,7 @@ class Stretch:
     begin: float
     X: np.ndarray
     y: np.ndarray
+    bare: bool
     rigid: np.ndarray
     tau: np.ndarray
     nominal: np.ndarray
@@ -51,19 +53,13 @@ class Stretch:
         """With nothing but these columns, all of inertials, as they are without any explanation."""
         k = self.rigid.shape[-1]
         own = np.where(columns < k, columns, columns - (self.X.shape[-1] - k))
-        return dataclasses.replace(self, X=self.rigid[..., own], y=self.tau - self.nominal)
-
-    @property
-    def bare(self) -> bool:
-        """Whether inertials are as they are without any explanation."""
-        k = self.rigid.shape[-1]
-        return np.array_equal(self.X[..., :k], self.rigid) and np.array_equal(self.y, self.tau - self.nominal)
+        return dataclasses.replace(self, X=self.rigid[..., own], y=self.tau - self.nominal, bare=True)
 
     def stripped(self) -> "Stretch":
-        """With inertials as they are without any explanation."""
+        """With inertials as they are without any explanation, X and y of the same shapes."""
         k = self.rigid.shape[-1]
         X = np.concatenate([self.rigid, self.X[..., k:-k], self.rigid], axis=-1)
-        return dataclasses.replace(self, X=X, y=self.tau - self.nominal)
+        return dataclasses.replace(self, X=X, y=self.tau - self.nominal, bare=True)
 
 
 def stretch(
@@ -99,7 +95,7 @@ def stretch(
     nominal, tau = band.apply(nominal), band.apply(recording.tau)
     y = tau - band.apply(base) + band.apply(twice)
     return Stretch(
-        index, recording.t[kept], recording.began, X, y, rigid, tau, nominal, recording.unsure[kept],
+        index, recording.t[kept], recording.began, X, y, Y is upright, rigid, tau, nominal, recording.unsure[kept],
         recording.usable[kept], recording.q[kept], recording.qd[kept], recording.qdd[kept],
         np.asarray(along.rigid.tool)[kept], np.asarray(along.rigid.tool_jacobian)[kept],
     )  # fmt: skip

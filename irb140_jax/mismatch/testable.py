@@ -15,7 +15,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.along import columns_along, prepared
 from irb140_jax.mismatch.candidates import Library
 from irb140_jax.mismatch.evidence import eliminated
-from irb140_jax.mismatch.explain import Explanation
+from irb140_jax.mismatch.explanation import Explanation
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.excite import Excitation, fourier_motion, within
 from irb140_jax.robot import Robot

@@ -13,7 +13,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.explain import Explanation
+from irb140_jax.mismatch.explanation import Explanation
 from irb140_jax.mismatch.testable import REFERENCE_SHARE, VISIBLE, Reference, Site
 from irb140_jax.recordings.low_pass import Band
 

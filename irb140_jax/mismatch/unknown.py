@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from irb140_jax.mismatch.explain import Explanation, full_posterior, parts
+from irb140_jax.mismatch.explanation import Explanation, full_posterior, parts
 from irb140_jax.mismatch.noise import spread
 from irb140_jax.mismatch.prove import HeldOut, held_out_gain
 from irb140_jax.mismatch.rows import Stretch

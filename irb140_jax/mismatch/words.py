@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.explain import Explanation, fitted, full_posterior
+from irb140_jax.mismatch.explanation import Explanation, fitted, full_posterior
 from irb140_jax.mismatch.prove import HeldOut
 from irb140_jax.mismatch.unknown import Unexplained
 from irb140_jax.robot import Robot
