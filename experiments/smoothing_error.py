@@ -19,7 +19,6 @@ from irb140_jax.recordings import smooth
 from irb140_jax.recordings.conceal import ConcealedCase
 from irb140_jax.recordings.condition import choose_band, conditioned
 from irb140_jax.recordings.low_pass import filtered, kernels
-from irb140_jax.recordings.smooth import noise_density
 from irb140_jax.robot import Robot
 
 CASES: dict[Kind, range] = {"single": range(1, 62, 6), "several": range(0, 20, 2), "rough": range(0, 20, 2)}
@@ -57,18 +56,33 @@ def errors(robot: Robot, case: ConcealedCase) -> np.ndarray:
 def counted(robot: Robot, case: ConcealedCase) -> tuple[int, int]:
     """Frequencies at which nothing counts as motion with care, and how many of them count without."""
     nothing = wrong = 0
-    for r in case.recordings[:-1]:
-        rate = (len(r.t) - 1) / float(r.t[-1] - r.t[0])
-        t = r.t[0] + np.arange(len(r.t)) / rate
-        even = np.allclose(r.t, t, rtol=0.0, atol=1e-3 / rate)
-        q = r.q if even else np.stack([np.interp(t, r.t, x) for x in r.q.T], axis=1)
-        for x, white in zip(q.T, noise_density(r, r.t if even else t, rate), strict=True):
-            kept = smooth.signal_share(x, white, rate)[0]
-            with careless():
-                loose = smooth.signal_share(x, white, rate)[0]
-            nothing += int(np.sum(kept == 0.0))
-            wrong += int(np.sum((kept == 0.0) & (loose > 0.0)))
+    recordings = list(case.recordings[:-1])
+    band = choose_band(recordings, robot)
+    with asked() as spectra:
+        conditioned(recordings, band)
+    for x, density, rate in spectra:
+        kept = smooth.signal_share(x, density, rate)[0]
+        with careless():
+            loose = smooth.signal_share(x, density, rate)[0]
+        nothing += int(np.sum(kept == 0.0))
+        wrong += int(np.sum((kept == 0.0) & (loose > 0.0)))
     return nothing, wrong
+
+
+@contextlib.contextmanager
+def asked() -> Iterator[list[tuple[np.ndarray, float, float]]]:
+    """The positions that the smoother is asked about, on their grid, with the noise that it is told of."""
+    kept, out = smooth.signal_share, []
+
+    def noted(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, float, np.ndarray]:
+        out.append((x, density, rate))
+        return kept(x, density, rate)
+
+    try:
+        smooth.signal_share = noted
+        yield out
+    finally:
+        smooth.signal_share = kept
 
 
 def main(out: Path = Path("results/smoothing_error.md")) -> None:

@@ -102,7 +102,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
     rmse = proof.rmse(proof.corrected)
     for j in range(len(torque)):
         rows = _rows(ex, proof, j)
-        least = max(MATERIAL_SHARE, (MATERIAL_TORQUE * torque[j] / max(rmse[j], 1e-300)) ** 2)
+        least = max(MATERIAL_SHARE, (MATERIAL_TORQUE * torque[j] / max(rmse[j], 1e-100)) ** 2)
         # No share of so small a residual could matter.
         if len(rows.residual) < 200 or least > 1.0:
             continue
