@@ -8,6 +8,7 @@ import pytest
 from helpers_recordings import motion, recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.effects.grids import Scales, nearest_in_each_direction
 from irb140_jax.mismatch import explain as loop
 from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation
@@ -61,3 +62,42 @@ def test_without_those_rounds_the_shape_would_be_further_off(monkeypatch):
 @pytest.mark.parametrize("height", [0.0, 0.02])
 def test_what_is_hardly_seen_takes_no_more_rounds(height):
     assert explained(height)[1] == loop.PASSES
+
+
+def grid_of_stretches() -> np.ndarray:
+    one = np.ones(1)
+    return FRICTION[1].shapes(Scales(one, one, one, -one, one, 10.0, one, one), np.array([0]))
+
+
+@pytest.mark.parametrize("step", [(0.3, 0.2), (-0.4, 0.1), (0.0, -0.45)])
+def test_between_three_points_a_shape_is_where_their_parabola_is_highest(step):
+    grid = grid_of_stretches()
+    axes = np.column_stack([grid[:, 0] / np.diff(np.unique(grid[:, 0]))[0], np.log(grid[:, 1]) / np.log(5.0) * 2.0])
+    best = int(np.argmin(np.abs(axes - np.median(axes, axis=0)).sum(axis=1)))
+    odds = -np.sum(([3.0, 7.0]) * (axes - axes[best] - step) ** 2, axis=1)
+    assert best == np.argmax(odds)
+    top = FRICTION[1].peak(grid, grid[best], odds)
+    spacing = np.diff(np.unique(grid[:, 0]))[0], np.sqrt(5.0)
+    np.testing.assert_allclose(top, grid[best] * [1.0, spacing[1] ** step[1]] + [spacing[0] * step[0], 0.0])
+    finer = FRICTION[1].finer(grid, top)
+    assert finer.shape == grid.shape and np.any(np.all(np.isclose(finer, top), axis=1))
+    assert np.all(np.ptp(finer, axis=0) < 0.5 * np.ptp(grid, axis=0))
+
+
+def test_where_a_neighbour_is_inadmissible_the_best_point_stays():
+    grid = grid_of_stretches()
+    odds = np.full(len(grid), -np.inf)
+    odds[10] = 1.0
+    np.testing.assert_allclose(FRICTION[1].peak(grid, grid[10], odds), grid[10])
+
+
+def test_a_grid_has_two_neighbours_in_each_of_its_directions():
+    grid = grid_of_stretches()
+    inside = grid[3 * 3 + 1]
+    beside = nearest_in_each_direction(grid, inside)
+    assert len(beside) == 2
+    for points in beside:
+        moved = grid[points] - inside
+        assert np.all(np.isclose(moved, 0.0).any(axis=1)) and not np.isclose(moved, 0.0).all(axis=1).any()
+        assert {-1.0, 1.0} <= set(np.sign(moved[np.abs(moved) > 1e-12]))
+    assert nearest_in_each_direction(grid[:1], grid[0]) == []
