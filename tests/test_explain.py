@@ -20,28 +20,28 @@ FRICTION = tuple(CATALOGUE[slug] for slug in ("coulomb_friction", "position_depe
 CENTRE, WIDTH = 0.137, 0.291  # rad
 
 
-def rubbing(seed: int, height: float) -> Recording:
+def rubbing(seed: int, height: float, width: float) -> Recording:
     """The shoulder of a quiet arm rubs by so much more [N m] in a stretch of its range."""
     smooth = recording(seed=seed, friction=0.0, noise=0.002, duration=16.0)
     _, q, qd, _ = motion(3, seed=seed, duration=16.0)
     tau = smooth.tau.copy()
-    tau[:, 0] += height * (0.5 + np.exp(-(((q[:, 0] - CENTRE) / WIDTH) ** 2))) * np.sign(qd[:, 0])
+    tau[:, 0] += height * (0.5 + np.exp(-(((q[:, 0] - CENTRE) / width) ** 2))) * np.sign(qd[:, 0])
     return dataclasses.replace(smooth, tau=tau)
 
 
 @cache
-def explained(height: float) -> tuple[Explanation, int]:
+def explained(height: float, width: float = WIDTH) -> tuple[Explanation, int]:
     """The explanation of two recordings, and after how many rounds."""
-    logs, arm, told = [rubbing(4, height), rubbing(5, height)], robot(), []
+    logs, arm, told = [rubbing(seed, height, width) for seed in (4, 5)], robot(), []
     band = choose_band(logs, arm)
     ex = explain(arm, conditioned(logs, band), band, FRICTION, 0.05, told.append)
     return ex, sum("searching" in message for message in told)
 
 
-def off(ex: Explanation) -> np.ndarray:
+def off(ex: Explanation, width: float = WIDTH) -> np.ndarray:
     """How far the stretch that was found is from where it is, as a share of its width, and its width off, too."""
     (found,) = [m.shape for m in ex.members if m.slug == "position_dependent_friction"]
-    return np.abs(found - [CENTRE, WIDTH]) / WIDTH
+    return np.abs(found - [CENTRE, width]) / width
 
 
 def test_a_shape_that_is_known_well_is_made_finer_and_the_name_outlasts_its_law():
@@ -57,6 +57,12 @@ def test_without_those_rounds_the_shape_would_be_further_off(monkeypatch):
     coarse, rounds = explained.__wrapped__(6.0)
     assert rounds == loop.PASSES
     assert off(coarse).max() > 5.0 * off(better).max()
+
+
+@pytest.mark.parametrize("width", [0.08, 0.16, 0.32, 0.64])
+def test_stretches_narrow_and_wide_are_found_where_they_are(width):
+    ex, _ = explained(0.05, width)
+    assert np.all(off(ex, width) < 0.15)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.02])

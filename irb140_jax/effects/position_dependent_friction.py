@@ -51,20 +51,17 @@ class PositionDependentFriction(AbstractEffect):
 
     def peak(self, grid, best, odds):
         # Widths are few and far apart: the top of a parabola through three points in each direction.
-        axes = grid[::WIDTHS, 0], np.log(grid[:WIDTHS, 1])
+        centres, widths = grid[::WIDTHS, 0], np.log(grid[:WIDTHS, 1])
+        i, k = _nearest(centres, best[0]), _nearest(widths, np.log(best[1]))
         odds = odds.reshape(CENTRES, WIDTHS)
-        i, k = (int(np.argmin(np.abs(axis - x))) for axis, x in zip(axes, (best[0], np.log(best[1])), strict=True))
-        centre, width = _top(axes[0], odds[:, k], i), _top(axes[1], odds[i], k)
-        return np.array([centre, np.exp(width)])
+        return np.array([_top(centres, odds[:, k], i), np.exp(_top(widths, odds[i], k))])
 
     def finer(self, grid, best):
-        centres, widths = grid[::WIDTHS, 0], grid[:WIDTHS, 1]
-        step = centres[1] - centres[0]
-        ratio = np.sqrt(widths[1] / widths[0])
-        if widths[0] < best[1] < widths[-1]:  # the peak between its neighbours
-            ratio = np.sqrt(ratio)
-        near = best[0] + 0.25 * step * np.arange(-(CENTRES // 2), CENTRES - CENTRES // 2)
-        return np.array(list(itertools.product(near, best[1] * np.geomspace(1 / ratio, ratio, WIDTHS))))
+        centres, widths = grid[::WIDTHS, 0], np.log(grid[:WIDTHS, 1])
+        # Far apart, widths are told from centres badly: wide enough that the next grid's end shows where to go.
+        near = best[0] + 0.25 * (centres[1] - centres[0]) * np.arange(-(CENTRES // 2), CENTRES - CENTRES // 2)
+        wide = best[1] * np.exp(0.5 * (widths[1] - widths[0]) * np.linspace(-1.0, 1.0, WIDTHS))
+        return np.array(list(itertools.product(near, wide)))
 
     def columns(self, motion, joints, shape):
         bump = jnp.exp(-(((of_site(motion.q, joints) - shape[0]) / shape[1]) ** 2))
@@ -88,6 +85,10 @@ class PositionDependentFriction(AbstractEffect):
             f"{names}: friction of {values['coulomb']:.3g} {units['coulomb']} changes by "
             f"{100 * values['depth']:.3g} % around {values['centre']:.3g} {units['centre']}"
         )
+
+
+def _nearest(values, x):
+    return int(np.argmin(np.abs(values - x)))
 
 
 def _top(values, odds, at):
