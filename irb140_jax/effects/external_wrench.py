@@ -10,7 +10,7 @@ from irb140_jax.effects.base import AbstractEffect, Parameter
 
 RISES = (0.01, 0.05)  # s in which a push begins and ends, in the first grid: a blow, or somebody leaning on the tool
 SHARPEST, SOFTEST = 0.004, 0.1  # between which it is looked for; what is sharper is beyond the low-pass
-BLUR = 0.96  # of its rise: standard deviation of when a push begins; a ramp as spread does so pi/2 rises before its middle
+BLUR = 0.96  # of its rise: standard deviation of when a push begins; a ramp as spread begins pi/2 rises earlier
 EDGES = 32  # instants per recording at which a push may begin or end in the first scan
 LONGEST = 0.4  # of a recording; what lasts longer is no event
 SHORTEST = 0.2  # s; what lasts less is a blow, or a misfit
