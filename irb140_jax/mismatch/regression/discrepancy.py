@@ -1,0 +1,73 @@
+"""Model discrepancy: what a joint's torque may differ by from any law of the library, as a function of its own state.
+
+Two zero-mean blocks of features a joint.  The smooth block is a function of position, speed, direction and load.  The
+reversal block holds what a friction law may do differently around a change of direction: bristles, rounding, lateness.
+Neither holds a term that a named effect consists of (a constant, the direction itself, position, speed, acceleration,
+load): the discrepancy stands for what no law explains, not for the laws.
+
+Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(3), 2001; the low rank as in Rasmussen
+and Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
+"""
+
+import numpy as np
+
+from irb140_jax.effects import Scales
+from irb140_jax.recordings.condition import Conditioned
+
+TRAVEL = (2e-4, 8e-4, 3e-3, 1.2e-2)  # of a joint's range: over which bristles turn round
+ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which a sign is rounded off
+LATE = (-0.01, -0.005, 0.005, 0.01, 0.02)  # s by which friction turns before or after the joint
+ORDERS = 6  # of the polynomials in position
+SPEEDS = 4  # of the polynomials in the logarithm of speed
+
+
+def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
+    """Smooth functions of one joint's state, shape (T, 41).
+
+    Args:
+        r: T samples of n joints.
+        load: Torque that the transmissions carry [N m or N], shape (T, n).
+        scales: Sizes over all recordings.
+        j: The joint.
+    """
+    middle, half = 0.5 * (scales.high[j] + scales.low[j]), 0.5 * max(scales.high[j] - scales.low[j], 1e-9)
+    x = np.clip((r.q[:, j] - middle) / half, -1.0, 1.0)
+    position = np.polynomial.chebyshev.chebvander(x, ORDERS)[:, 1:]
+    direction, carried = r.direction[:, j], load[:, j] / max(float(scales.torque[j]), 1e-12)
+    fast = 1.0 + 2.0 * np.log(np.abs(r.qd[:, j]) / scales.speed[j] + 1e-3) / np.log(1e3)
+    speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
+    turned, even = direction[:, None], np.abs(carried)[:, None]
+    parts = [
+        position[:, 1:], turned * position, turned * speed, speed,
+        (turned * speed)[:, :, None] * position[:, None, :2],
+        turned * even, turned * even**2, (carried**2)[:, None], carried[:, None] * position[:, :2],
+        turned * even * position[:, :2], turned * even * speed,
+    ]  # fmt: skip
+    return np.concatenate([p.reshape(len(x), -1) for p in parts], axis=1)
+
+
+def reversal_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
+    """What happens around one joint's reversals and along its slopes, shape (T, 41); arguments as above."""
+    q, qd, qdd, dt = r.q[:, j], r.qd[:, j], r.qdd[:, j], float(np.mean(np.diff(r.t)))
+    travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
+    direction = r.direction[:, j]
+    base = [_relaxed(q, share * travel) - direction for share in TRAVEL]
+    base += [direction - np.tanh(qd / (share * scales.speed[j])) for share in ROUNDED]
+    rest = float(scales.rest_speed[j])
+    base += [np.tanh((qd + late * qdd) / rest) - direction for late in LATE]
+    X = np.stack(base, axis=1)
+    carried = np.abs(load[:, j]) / max(float(scales.torque[j]), 1e-12)
+    pushed = np.abs(qdd) / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
+    slopes = np.stack([np.gradient(load[:, j], dt), np.gradient(qdd, dt)], axis=1)
+    return np.concatenate([X, X * carried[:, None], X * pushed[:, None], slopes], axis=1)
+
+
+def _relaxed(q: np.ndarray, travel: float) -> np.ndarray:
+    """Direction that follows motion over some travel: Dahl's bristles of unit strength, shape (T,)."""
+    dq = np.diff(q, prepend=q[0])
+    keep, sign = np.exp(-np.abs(dq) / travel), np.sign(dq)
+    z, out = 0.0, np.empty_like(q)
+    for i, (k, s) in enumerate(zip(keep.tolist(), sign.tolist(), strict=True)):
+        z = k * z + (1.0 - k) * s
+        out[i] = z
+    return out

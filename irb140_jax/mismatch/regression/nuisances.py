@@ -1,0 +1,82 @@
+"""Nuisance parameters: what every log may be wrong by, with stated prior widths, and the model discrepancy."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from irb140_jax.effects import Scales
+from irb140_jax.mismatch.along import Prepared
+from irb140_jax.mismatch.regression.discrepancy import reversal_features, smooth_features
+from irb140_jax.recordings.low_pass import Band
+from irb140_jax.robot import Robot
+
+GAIN_COMMON, GAIN_JOINT = 0.10, 0.03  # torque scale of all joints, and of each beside it
+DELAY_COMMON, DELAY_JOINT = 1e-3, 5e-4  # s between torque and position channels
+SMOOTHED = 2e-5  # s^2 of the torque's second derivative: what smoothing takes off accelerations that noise hides
+ROTOR = 0.10  # of the stated armature
+SCALED = ("smooth", "reversal", "slope")  # blocks of a joint whose size is learned from the recordings
+
+
+@dataclasses.dataclass(frozen=True)
+class Nuisances:
+    """Columns of one recording beside inertials and effects, low-passed rows as in `Stretch`, in prior units.
+
+    Attributes:
+        common: Torque scale and delay of all joints, shape (R, n, 2).
+        own: Of each joint, fixed widths first, then the blocks `SCALED`; shape (R, D_j) each.
+        groups: Which block each own column belongs to: -1 fixed, else an index into `SCALED`; shape (D_j,) each.
+    """
+
+    common: np.ndarray
+    own: tuple[np.ndarray, ...]
+    groups: tuple[np.ndarray, ...]
+
+
+def nuisances(
+    robot: Robot, along: Sequence[Prepared], loads: Sequence[np.ndarray], band: Band, scales: Scales
+) -> list[Nuisances]:
+    """Columns of all recordings; features of the discrepancy have the RMS of the joint's torque over all of them.
+
+    Args:
+        robot: The nominal model.
+        along: The recordings with what the rigid body does along them.
+        loads: Torque of the model as corrected so far along each, shape (T, n) [N m or N].
+        band: Of the comparison.
+        scales: Sizes over all recordings.
+    """
+    n, count = robot.n, len(along)
+    raw: list[list[list[np.ndarray]]] = []  # recording, joint, block
+    commons = []
+    for r, (a, load) in enumerate(zip(along, loads, strict=True)):
+        motion, dt = a.recording, float(np.mean(np.diff(a.recording.t)))
+        rate = np.gradient(load, dt, axis=0)
+        bend = SMOOTHED * np.gradient(rate, dt, axis=0)
+        commons.append(band.apply(np.stack([GAIN_COMMON * load, DELAY_COMMON * rate, 2.0 * bend], axis=-1)))
+        joints = []
+        for j in range(n):
+            rotor = ROTOR * float(robot.armature[j]) * motion.qdd[:, j]
+            fixed = np.stack([GAIN_JOINT * load[:, j], DELAY_JOINT * rate[:, j], rotor, bend[:, j]], axis=1)
+            slope = np.zeros((len(motion.t), count))
+            slope[:, r] = motion.direction[:, j]
+            blocks = (fixed, smooth_features(motion, load, scales, j), reversal_features(motion, load, scales, j), slope)
+            joints.append([band.apply(b) for b in blocks])
+        raw.append(joints)
+    out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
+    for j in range(n):
+        for block in range(1, 4):
+            power = sum(np.sum(raw[r][j][block] ** 2, axis=0) for r in range(count))
+            rows = sum(len(raw[r][j][block]) for r in range(count))
+            rms = np.sqrt(power / rows)
+            gone = rms < 1e-9 * np.max(rms, initial=1e-300)
+            width = raw[0][j][block].shape[1]
+            # Slopes are shares of a friction level; a discrepancy of size one is as large as the torque.
+            size = scales.torque[j] / (1.0 if block == 3 else np.sqrt(width))
+            factor = np.where(gone, 0.0, size / np.where(gone, 1.0, 1.0 if block == 3 else rms))
+            for r in range(count):
+                raw[r][j][block] = raw[r][j][block] * factor
+        group = np.repeat([-1, 0, 1, 2], [raw[0][j][b].shape[1] for b in range(4)])
+        for r in range(count):
+            out[r][0].append(np.concatenate(raw[r][j], axis=1))
+            out[r][1].append(group)
+    return [Nuisances(c, tuple(own), tuple(g)) for c, (own, g) in zip(commons, out, strict=True)]

@@ -1,0 +1,1 @@
+"""Model selection: the evidence of sets of effects, moves between sets, and averages over them."""

@@ -1,0 +1,153 @@
+"""The search over sets of effects: reversible moves, each judged with sizes of the discrepancy fitted for that set."""
+
+import itertools
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.selection.evidence import Settings, Space
+
+BEST = 3  # candidates of different kinds that a screening passes on to be judged in full
+LEAST = 1e-2  # nats that a move must gain
+
+
+class Search:
+    """Sets visited so far with their log posterior, and the best of them.
+
+    Args:
+        space: What may be in a set.
+        settings: Where sizes and levels start.
+    """
+
+    def __init__(self, space: Space, settings: Settings):
+        self.space, self.start = space, settings
+        self.visited: dict[frozenset[int], tuple[float, Settings]] = {}
+
+    def judged(self, chosen: Iterable[int], settings: Settings, joints: Iterable[int] | None = None) -> float:
+        """Log posterior of a set, its settings fitted from some near ones."""
+        key = frozenset(chosen)
+        if key not in self.visited:
+            at = sorted(set(joints)) if joints is not None else None
+            self.visited[key] = self.space.settled(tuple(sorted(key)), settings, at)
+        return self.visited[key][0]
+
+    def run(self, chosen: Iterable[int] = ()) -> tuple[int, ...]:
+        """The best set that no move improves."""
+        now = frozenset(chosen)
+        self.judged(now, self.start)
+        moves: tuple[Callable[[frozenset[int]], frozenset[int]], ...] = (
+            self._added, self._removed, self._exchanged, self._on_all_joints, self._ordinary,
+        )  # fmt: skip
+        moving = True
+        while moving:
+            moving = False
+            for move in moves:
+                while (better := move(now)) != now:
+                    now, moving = better, True
+                    self.visited[now] = self.space.settled(tuple(sorted(now)), self.visited[now][1])
+        return tuple(sorted(now))
+
+    def _value(self, chosen: frozenset[int]) -> float:
+        return self.visited[chosen][0]
+
+    def _best(self, now: frozenset[int], others: Iterable[tuple[frozenset[int], Iterable[int]]]) -> frozenset[int]:
+        """The best of some sets if it improves on a set, else that set."""
+        settings, best = self.visited[now][1], now
+        for other, joints in others:
+            if self.judged(other, settings, joints) > self._value(best) + (LEAST if best == now else 0.0):
+                best = other
+        return best
+
+    def screened(self, chosen: frozenset[int], joint: int, most: int = BEST, avoid: frozenset[str] = frozenset()) -> list[int]:
+        """The most promising candidates at a joint beside a set: the best of each kind and site, by the sum over both
+        the set's own settings and settings with less discrepancy and noise."""
+        space, settings = self.space, self.visited[chosen][1]
+        bad = space.conflicts(tuple(chosen))
+        which = np.array([i for i in space.touching[joint] if not bad[i] and i not in chosen
+                          and space.candidates[i].slug not in avoid], dtype=int)  # fmt: skip
+        if not len(which):
+            return []
+        own = settings[joint]
+        lower = tuple(max(k - 2, 0) for k in own)
+        lowest = (*(min(k, 1) for k in own[:-1]), max(own[-1] - 6, 0))
+        best = np.full(len(which), -np.inf)
+        here = space.log_evidence(tuple(chosen), settings)
+        for other in dict.fromkeys((own, lower, lowest)):
+            trial = (*settings[:joint], other, *settings[joint + 1 :])
+            base = space.log_evidence(tuple(chosen), trial) - here
+            gained = space.gains(tuple(chosen), trial, which)
+            best = np.maximum(best, base + gained) if np.isfinite(base) else best
+        kinds: dict[tuple[str, tuple[int, ...]], int] = {}
+        for k in np.argsort(-best):
+            c = space.candidates[which[k]]
+            if np.isfinite(best[k]) and len(kinds) < most:
+                kinds.setdefault((c.slug, c.joints), int(which[k]))
+        return list(kinds.values())
+
+    def _joints(self, *members: int) -> set[int]:
+        return {j for m in members for j in self.space.candidates[m].joints}
+
+    def _added(self, now: frozenset[int]) -> frozenset[int]:
+        tries = {i for j in range(len(self.space.joints)) for i in self.screened(now, j, 2)}
+        return self._best(now, ((now | {i}, self._joints(i)) for i in tries))
+
+    def _removed(self, now: frozenset[int]) -> frozenset[int]:
+        return self._best(now, ((now - {c}, self._joints(c)) for c in now))
+
+    def _exchanged(self, now: frozenset[int]) -> frozenset[int]:
+        """One or two members at a joint for one or two others there."""
+        for drop in [*((c,) for c in now), *self._pairs(now)]:
+            rest, joints = now - set(drop), self._joints(*drop)
+            self.judged(rest, self.visited[now][1], joints)
+            others: list[tuple[frozenset[int], set[int]]] = []
+            for j in sorted(joints):
+                for i in self.screened(rest, j):
+                    one = rest | {i}
+                    others.append((one, joints | self._joints(i)))
+                    if len(drop) == 1:
+                        self.judged(one, self.visited[rest][1], joints | self._joints(i))
+                        others += [(one | {k}, joints | self._joints(i, k)) for k in self.screened(one, j, 1)]
+            if (better := self._best(now, others)) != now:
+                return better
+        return now
+
+    def _pairs(self, now: frozenset[int]) -> list[tuple[int, int]]:
+        return [p for p in itertools.combinations(sorted(now), 2) if self._joints(p[0]) & self._joints(p[1])]
+
+    def _on_all_joints(self, now: frozenset[int]) -> frozenset[int]:
+        """One kind on every joint at once, or one effect of all joints in the place of all of a kind."""
+        space, tries = self.space, []
+        for slug in dict.fromkeys(c.slug for c in space.candidates if len(c.joints) == 1):
+            grown = now
+            for j in range(len(space.joints)):
+                if not any(self._is(m, slug, j) for m in grown):
+                    self.judged(grown, self.visited[now][1], [j])
+                    kinds = {c.slug for c in space.candidates} - {slug}
+                    grown = grown | set(self.screened(grown, j, 1, frozenset(kinds)))
+            if len(grown) > len(now) + 1:
+                tries.append((grown, None))
+            alike = {m for m in now if space.candidates[m].slug == slug}
+            if len(alike) > 1:
+                rest = now - alike
+                self.judged(rest, self.visited[now][1])
+                several = {i for j in range(len(space.joints)) for i in self.screened(rest, j, 40)
+                           if len(space.candidates[i].joints) > 1}  # fmt: skip
+                tries += [(rest | {i}, None) for i in several]
+        return self._best(now, tries)
+
+    def _is(self, member: int, slug: str, joint: int) -> bool:
+        c = self.space.candidates[member]
+        return c.slug == slug and joint in c.joints
+
+    def _ordinary(self, now: frozenset[int]) -> frozenset[int]:
+        """Ordinary friction for all friction of a joint."""
+        tries = []
+        for j in range(len(self.space.joints)):
+            rubs = {m for m in now if self._of(m).effect.friction and self._of(m).joints == (j,)}
+            usual = {i for i in self.space.touching[j] if self._of(i).effect.ordinary and self._of(i).joints == (j,)}
+            tries += [(now - rubs | usual, [j]), *((now - rubs | {i}, [j]) for i in usual)]
+        return self._best(now, tries)
+
+    def _of(self, member: int) -> Candidate:
+        return self.space.candidates[member]
