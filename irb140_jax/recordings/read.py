@@ -1,6 +1,7 @@
 """A file to a checked `Recording`: the way in for everything a user measured."""
 
 import dataclasses
+import hashlib
 import pathlib
 
 import numpy as np
@@ -31,12 +32,13 @@ def read_recording(path: str | pathlib.Path, robot: Robot, columns: str | pathli
         RecordingError: It can't be used; the message says file, column, row (counted from 1 below the header), what is
             wrong and what would mend it.
     """
-    recording = unchecked_recording(pathlib.Path(path), robot.joint_names, columns)
+    path = pathlib.Path(path)
+    recording = unchecked_recording(path, robot.joint_names, columns)
     recording = repair.without_glitches(repair.unwrapped(recording, robot.is_slide))
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
     check_against_model(recording, seen, robot)
-    return dataclasses.replace(recording, source=pathlib.Path(path).name)
+    return dataclasses.replace(recording, source=path.name, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 def unchecked_recording(
