@@ -93,9 +93,8 @@ def stub(monkeypatch):
 
 def irb140(*words, cwd=None) -> subprocess.CompletedProcess:
     """The command as a process of its own."""
-    code = "import sys; from irb140_jax.cli import main; sys.exit(main())"
     environment = os.environ | {"PYTHONPATH": str(MODEL.parents[1]), "COLUMNS": "100"}
-    command = [sys.executable, "-c", code, *map(str, words)]
+    command = [sys.executable, "-m", "irb140_jax", *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=cwd, env=environment)
 
 

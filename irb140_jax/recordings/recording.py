@@ -21,7 +21,7 @@ class Recording:
     Attributes:
         t: Time [s], shape (T,), strictly rising; the rate may jitter.
         q: Joint positions [rad or m], shape (T, n).
-        tau: Logged joint torques [N m or N], shape (T, n).
+        tau: Logged joint torques [N m or N], shape (T, n); all NaN where none was logged, as in a planned motion.
         joint_names: Names of the joints, in the order of the columns.
         qd: Logged joint velocities [rad/s or m/s], shape (T, n); None where they were not logged for every joint.
         qdd: Logged joint accelerations [rad/s^2 or m/s^2], shape (T, n); None likewise.
@@ -52,6 +52,11 @@ class Recording:
                 raise RecordingError(f"{self.source}: {name} has shape {value.shape}; allowed is (T, n) = {shape}, one "
                                      "row a sample and one column a joint")
 
+    @property
+    def has_torque(self) -> bool:
+        """Whether torque was logged; a planned motion has none."""
+        return not np.isnan(self.tau).all()
+
 
 def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Recording:
     """The samples `rows` of a recording, under the same name unless `source` gives another."""
@@ -77,7 +82,7 @@ def recording_columns(recording: Recording) -> dict[str, Float[np.ndarray, " T"]
     columns = {"t": recording.t}
     for name in ("q", "qd", "qdd", "tau"):
         value = getattr(recording, name)
-        if value is not None:
+        if value is not None and (name != "tau" or recording.has_torque):
             columns |= {f"{name}.{joint}": value[:, i] for i, joint in enumerate(recording.joint_names)}
     return columns | recording.extras
 
