@@ -62,7 +62,8 @@ def _two_ways(
         if len(rows) == 0:
             return ""
         a = rows.mean(axis=0)
-        said.append(f"{a @ w:.3g} +- {np.sqrt(max(a @ cov @ a, 0.0)):.1g} {_unit(robot, j)} while it moves towards {word}")
+        std = np.sqrt(max(a @ cov @ a, 0.0))
+        said.append(f"{a @ w:.3g} +- {std:.1g} {_unit(robot, j)} while it moves towards {word}")
     return f"; it is on average {said[0]} and {said[1]}"
 
 

@@ -46,7 +46,8 @@ def provenance(
 def _of_recording(r: Recording) -> dict[str, Any]:
     duration = float(r.t[-1] - r.t[0])
     rate = (len(r.t) - 1) / duration
-    return {"file": r.source, "sha256": r.sha256 or content_hash(r), "rows": len(r.t), "rate": rate, "duration": duration}
+    sha256 = r.sha256 or content_hash(r)
+    return {"file": r.source, "sha256": sha256, "rows": len(r.t), "rate": rate, "duration": duration}
 
 
 def _hash_of_robot(robot: Robot) -> str:
