@@ -91,7 +91,7 @@ def unchecked_recording(
         q=stacked([f"q.{joint}" for joint in joint_names]),
         tau=(stacked([f"tau.{joint}" for joint in joint_names]) if has_torque
              else np.full((len(table["t"]), len(joint_names)), np.nan)),
-        **{kind: stacked(names) for kind, names in complete.items()},
+        **{kind: stacked(names) for kind, names in complete.items()},  # pyright: ignore[reportArgumentType]
         extras={name: values for name, values in table.items() if name not in kept},
         file_t=file_t if len(file_t) > len(table["t"]) else None,
     )
