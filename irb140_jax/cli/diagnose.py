@@ -58,15 +58,23 @@ class Diagnose:
 
         robot = load_robot(self.robot) if self.robot else irb140()
         recordings = [read_recording(path, robot, columns=self.columns) for path in self.recordings]
-        return diagnosed(robot, recordings, self.inertial_uncertainty)
+        return diagnosed(robot, recordings, self.inertial_uncertainty, self._words())
+
+    def _words(self) -> tuple[str, ...]:
+        """Options that name files, as the diagnosis keeps them."""
+        files = {"--robot": self.robot, "--columns": self.columns}
+        return tuple(word for option, path in files.items() if path for word in (option, path.name))
 
 
-def diagnosed(robot: "Robot", recordings: list["Recording"], inertial_uncertainty: float = 0.05) -> "Result":
+def diagnosed(
+    robot: "Robot", recordings: list["Recording"], inertial_uncertainty: float = 0.05, words: tuple[str, ...] = ()
+) -> "Result":
     """The diagnosis, with its progress shown."""
     from irb140_jax.mismatch import DiagnoseConfig, diagnose
 
     with progress() as tell:
-        return diagnose(robot, recordings, DiagnoseConfig(inertial_uncertainty=inertial_uncertainty), tell)
+        config = DiagnoseConfig(inertial_uncertainty=inertial_uncertainty, words=words)
+        return diagnose(robot, recordings, config, tell)
 
 
 def _write(result: "Result", folder: pathlib.Path) -> None:
