@@ -67,9 +67,7 @@ def _from_files(case: "ConcealedCase", desk: pathlib.Path) -> "Result":
     return diagnosed(robot, [read_recording(path, robot) for path in paths])
 
 
-def _write(
-    result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path
-) -> None:
+def _write(result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path) -> None:
     """Recordings, diagnosis, report and truth into an empty folder."""
     from irb140_jax.mismatch import save
     from irb140_jax.report import html_report

@@ -1,7 +1,6 @@
 """irb140 diagnose."""
 
 import dataclasses
-import math
 import pathlib
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,9 +38,10 @@ class Diagnose:
     def run(self) -> None:
         if not self.recordings:
             raise InputError("diagnose: no recording was named; give at least one: irb140 diagnose REC --out DIR")
-        if not (math.isfinite(self.inertial_uncertainty) and self.inertial_uncertainty > 0):
+        if not 0.0 < self.inertial_uncertainty <= 1.0:  # so that what is no number is refused, too
             raise InputError(
-                f"--inertial-uncertainty {self.inertial_uncertainty}: allowed is a positive share, say 0.05 for 5 %"
+                f"--inertial-uncertainty {self.inertial_uncertainty:g}: allowed is a share above 0 and up to 1, say "
+                "0.05 for 5 %"
             )
         from irb140_jax.report import results_folder
 

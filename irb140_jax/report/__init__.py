@@ -6,7 +6,6 @@ from irb140_jax.report.made import write_table as write_table
 from irb140_jax.report.outputs import results_file as results_file
 from irb140_jax.report.outputs import results_folder as results_folder
 from irb140_jax.report.proposal import proposal_sentences as proposal_sentences
-from irb140_jax.report.results import MisplacedResultError as MisplacedResultError
 from irb140_jax.report.results import Results as Results
 from irb140_jax.report.reveal import Reveal as Reveal
 from irb140_jax.report.reveal import revealed as revealed

@@ -4,9 +4,9 @@ import contextlib
 import pathlib
 from collections.abc import Callable, Iterable, Iterator
 
-from irb140_jax.errors import InputError
+from irb140_jax.errors import InputError, MisplacedResultError
 from irb140_jax.report.made import DIAGNOSIS, MANIFEST, checksum, holds_a_diagnosis, read_manifest
-from irb140_jax.report.results import SCRATCH, MisplacedResultError, Results, said
+from irb140_jax.report.results import SCRATCH, Results, said
 
 
 @contextlib.contextmanager
@@ -64,7 +64,7 @@ def results_file(
             "another file, or move it away"
         )
     owned = lambda folder: {real.name: checksum(real)} if real.exists() and _replaceable(real, ours) else {}  # noqa: E731
-    with _room(out, real.parent, owned, None) as results:
+    with _room(out, real.parent, owned, name=real.name) as results:
         yield results
 
 
@@ -105,8 +105,9 @@ def _of_manifest(folder: pathlib.Path) -> dict[str, str]:
 
 @contextlib.contextmanager
 def _room(
-    out: pathlib.Path, folder: pathlib.Path, owned: Callable[[pathlib.Path], dict[str, str]], command: str | None
-) -> Iterator[Results]:
+    out: pathlib.Path, folder: pathlib.Path, owned: Callable[[pathlib.Path], dict[str, str]], command: str = "",
+    name: str = "",
+) -> Iterator[Results]:  # fmt: skip
     """The folder made, if it isn't there, and room in it; without a result nothing of that is left."""
     made: list[pathlib.Path] = []
     try:
@@ -114,10 +115,12 @@ def _room(
             if not path.exists():
                 path.mkdir()
                 made.append(path)
-        results = Results(folder, owned, command)
+        results = Results(folder, owned, command, name)
     except OSError as error:
         _remove(made)
-        raise InputError(f"--out {out}: nothing can be written there ({said(error)}); name another place") from None
+        raise InputError(
+            f"--out {_short(out)}: nothing can be written there ({said(error)}); name another place"
+        ) from None
     except InputError as error:
         _remove(made)
         raise InputError(f"--out {out}: {error}") from None

@@ -17,26 +17,26 @@ SCRATCH = ".irb140-"  # begins the name of the folder in which results are made
 KEPT = ".kept"  # ends the name of a user's file that stood in the way of a result
 
 
-class MisplacedResultError(OSError):
-    """The work is done, but its result could not be put where it was wanted; the message says where it is."""
-
-
 class Results:
     """Room on the disk for what a command is going to write, see `results_folder` and `results_file`.
 
     Attributes:
         folder: Where the files shall be.
+        name: Of the file, where it is one, links followed; else empty.
         desk: An empty folder for whatever is needed meanwhile; it vanishes in the end.
         kept: Files of the user that stood in the way, and what they are called now.
         misplaced: Why and where the result is elsewhere; None if all is well.
     """
 
-    def __init__(self, folder: pathlib.Path, owned: Callable[[pathlib.Path], dict[str, str]], command: str | None):
-        self.folder, self._owned, self._command = folder, owned, command
+    def __init__(
+        self, folder: pathlib.Path, owned: Callable[[pathlib.Path], dict[str, str]], command: str = "", name: str = ""
+    ):
+        self.folder, self.name, self._owned, self._command = folder, name, owned, command
         self._scratch = pathlib.Path(tempfile.mkdtemp(prefix=SCRATCH, dir=folder))
         self.desk = self._scratch / "desk"
         self.kept: list[tuple[pathlib.Path, pathlib.Path]] = []
         self.misplaced: str | None = None
+        self._stuck = False  # whether files of a former run could not be put back
         try:
             self.desk.mkdir()
             self._reserve = _reserved(self._scratch)
@@ -66,12 +66,13 @@ class Results:
     def close(self) -> None:
         """Remove what was needed meanwhile."""
         self._reserve.close()
-        shutil.rmtree(self._scratch, ignore_errors=True)
+        if not self._stuck:
+            shutil.rmtree(self._scratch, ignore_errors=True)
 
     def _written(self, writer: Callable[[pathlib.Path], None], fresh: pathlib.Path) -> None:
         fresh.mkdir()
         writer(fresh)
-        if self._command is not None:
+        if self._command:
             write_manifest(fresh, self._command)
         for name in _files(fresh):
             with (fresh / name).open("r+b") as file:
@@ -100,7 +101,10 @@ class Results:
                 move(fresh / name, self.folder / name)
         except BaseException:
             for old, new in reversed(done):
-                new.rename(old)
+                try:
+                    new.rename(old)
+                except OSError:
+                    self._stuck = True
             raise
         self.kept += kept
         for name in owned:
@@ -118,6 +122,8 @@ class Results:
         other = pathlib.Path(tempfile.mkdtemp(prefix="irb140-result-", dir=self.folder))
         fresh.rename(other / "result")
         self.misplaced = f"can't put the result into {self.folder} ({said(error)}); it is in {other / 'result'}"
+        if self._stuck:
+            self.misplaced += f"; what was there before is in {self._scratch / 'former'}"
         return other / "result"
 
 
@@ -148,7 +154,7 @@ def _undisturbed() -> Iterator[None]:
         yield
     finally:
         for number, handler in former.items():
-            signal.signal(number, handler)
+            signal.signal(number, handler or signal.SIG_DFL)
         for number in waiting[:1]:
             signal.raise_signal(number)
 
