@@ -285,13 +285,14 @@ def test_a_result_that_cannot_take_its_place_is_left_beside_it(forever, tmp_path
 
     with results_folder(tmp_path / "d", "test") as results:
         results.write(letter)
-    before = contents(tmp_path / "d")
+    before, places = contents(tmp_path / "d"), []
     with (
         pytest.raises(MisplacedResultError, match="Input/output error.* it is in") as said,
         results_folder(tmp_path / "d", "test") as results,
     ):
         monkeypatch.setattr(pathlib.Path, "rename", rename)
-        where = results.write(lambda folder: (folder / "diagnosis.json").write_text("second"))
+        places.append(results.write(lambda folder: (folder / "diagnosis.json").write_text("second")))
+    (where,) = places
     assert str(where) in str(said.value) and (where / "diagnosis.json").read_text() == "second"
     after = contents(tmp_path / "d")
     if forever:  # not even what was there could be put back

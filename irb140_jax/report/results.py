@@ -44,7 +44,7 @@ class Results:
             shutil.rmtree(self._scratch, ignore_errors=True)
             raise
 
-    def write(self, writer: Callable[[pathlib.Path], None]) -> pathlib.Path:
+    def write(self, writer: Callable[[pathlib.Path], object]) -> pathlib.Path:
         """Let `writer` write files into an empty folder, then put them in their place.
 
         Returns:
@@ -69,7 +69,7 @@ class Results:
         if not self._stuck:
             shutil.rmtree(self._scratch, ignore_errors=True)
 
-    def _written(self, writer: Callable[[pathlib.Path], None], fresh: pathlib.Path) -> None:
+    def _written(self, writer: Callable[[pathlib.Path], object], fresh: pathlib.Path) -> None:
         fresh.mkdir()
         writer(fresh)
         if self._command:
@@ -110,7 +110,7 @@ class Results:
         for name in owned:
             _remove_empty((self.folder / name).parent, self.folder)
 
-    def _elsewhere(self, writer: Callable[[pathlib.Path], None], error: OSError) -> pathlib.Path:
+    def _elsewhere(self, writer: Callable[[pathlib.Path], object], error: OSError) -> pathlib.Path:
         """The result in the folder for temporary files, as there is no writing where it should be."""
         other = pathlib.Path(tempfile.mkdtemp(prefix="irb140-result-"))
         self._written(writer, other / "result")
