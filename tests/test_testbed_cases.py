@@ -20,8 +20,8 @@ def test_a_case_is_a_function_of_its_draw_and_index():
 
 
 def test_other_draws_and_other_commits_hide_other_things():
-    drawn = [[cases.kinds_of(*which, i, commit) for i in range(50)] for *which, commit in
-             (("work", ""), ("check", ""), ("final", "a1"), ("final", "b2"))]  # fmt: skip
+    seeds_of = (("work", ""), ("check", ""), ("final", "a1"), ("final", "b2"))
+    drawn = [[cases.kinds_of(draw, i, commit) for i in range(50)] for draw, commit in seeds_of]
     assert all(a != b for k, a in enumerate(drawn) for b in drawn[:k])
 
 
