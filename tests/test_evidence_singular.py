@@ -9,7 +9,7 @@ EXPONENTS = [0.0, 3.0, 6.0, 9.0]  # of ten, the sizes that columns differ by
 
 
 def singular(seed: int, exponent: float, columns: int = 12, rows: int = 40) -> np.ndarray:
-    """A Gram matrix of columns and y, of rank 3 but for two columns, some the same, one zero, of very different sizes."""
+    """A Gram matrix of columns and y, nearly of rank 3, some the same, one zero, of very different sizes."""
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(rows, 3)) @ rng.normal(size=(3, columns))
     A[:, 0] += rng.normal(size=rows)

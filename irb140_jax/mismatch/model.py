@@ -57,7 +57,7 @@ def better_known(robot: Robot, phi: np.ndarray, named: Sequence[Named]) -> Robot
     """The robot whose slopes over position and speed shape the effects: refitted inertials, and the springs named.
 
     The load that effects see holds those springs; without them in the slopes, play would be taken out of a link that
-    is softer or stiffer than its load says.  Inertials are those of possible bodies: what swings on a spring has a mass.
+    is softer or stiffer than its load says.  Links are possible bodies: what swings on a spring has a mass.
 
     Args:
         robot: The nominal model.
