@@ -107,7 +107,7 @@ def root(M: np.ndarray) -> np.ndarray:
         return np.linalg.cholesky(M)
     except np.linalg.LinAlgError:
         values, vectors = np.linalg.eigh(M)
-        R = np.linalg.qr(np.sqrt(np.maximum(values, 1.0))[:, None] * vectors.T, mode="r")
+        _, R = np.linalg.qr(np.sqrt(np.maximum(values, 1.0))[:, None] * vectors.T)
         return (R * np.sign(np.diag(R))[:, None]).T
 
 
