@@ -41,11 +41,14 @@ class DiagnoseConfig:
         effects: The library; by default every effect of the catalogue.
         words: What the command line said beside the recordings and the uncertainty, to be kept in the diagnosis:
             `--robot arm.xml`.
+        discrepancy: Whether laws may be wrong by a function of the state, and logs by the instrument: the second
+            engine, which is being compared with the first.
     """
 
     inertial_uncertainty: float = 0.05
     effects: tuple[AbstractEffect, ...] = tuple(CATALOGUE.values())
     words: tuple[str, ...] = ()
+    discrepancy: bool = False
 
     @property
     def options(self) -> dict[str, Any]:
@@ -109,11 +112,13 @@ def _diagnosed(
             f"{smooth[int(np.argmin(rows))].source}: {min(rows)} samples below {band.torque:.3g} Hz are left after "
             f"conditioning, {sum(rows)} in all; that is too few to compare, record at least 15 s of motion"
         )
-    ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, progress)
+    ex = explain(
+        robot, smooth, band, config.effects, config.inertial_uncertainty, progress, discrepancy=config.discrepancy
+    )
     progress("proving on data that the fit did not see")
-    ex = lasting(transferring(ex))
+    ex = ex if config.discrepancy else lasting(transferring(ex))
     refit, proof, rest = _proved(ex, progress)
-    doubtful = {c for u in rest for c in u.doubtful}
+    doubtful = set() if config.discrepancy else {c for u in rest for c in u.doubtful}
     if doubtful:  # names that only stand in for what has none
         ex = explained_by(ex, tuple(c for c in ex.chosen if c not in doubtful))
         refit, proof, rest = _proved(ex, progress)

@@ -10,13 +10,22 @@ from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
 from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble, first_noise, problem
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
-from irb140_jax.mismatch.explanation import Explanation, explained_by, fitted, full_posterior, noise_under, parts
+from irb140_jax.mismatch.explanation import (
+    Explanation,
+    explained_by,
+    fitted,
+    full_posterior,
+    noise_under,
+    parts,
+)
 from irb140_jax.mismatch.model import Named, better_known, composed
 from irb140_jax.mismatch.name import guessed, search
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
+from irb140_jax.mismatch.regression.nuisances import nuisances
 from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
+from irb140_jax.mismatch.selection.selected import selected
 from irb140_jax.mismatch.silent import SoftFriction
 from irb140_jax.mismatch.tangent import Point, point
 from irb140_jax.recordings.condition import Conditioned
@@ -36,6 +45,8 @@ def explain(
     effects: Sequence[AbstractEffect],
     uncertainty: float,
     progress: Callable[[str], None] = lambda _: None,
+    *,
+    discrepancy: bool = False,
 ) -> Explanation:
     """Search for what the model leaves out.
 
@@ -46,6 +57,7 @@ def explain(
         effects: The library.
         uncertainty: Relative standard deviation of the inertials.
         progress: Told what is being done.
+        discrepancy: Whether laws may be wrong (see `regression.discrepancy`).
     """
     factor, effects = inertial_prior_factor(robot, 1.0), (*effects, SoftFriction())
     progress("rigid body along the recordings")
@@ -71,6 +83,12 @@ def explain(
         rows = [stretch(lib, r, i, band, factor, load, at) for i, (r, load) in enumerate(both)]
         data = assemble(lib, rows, uncertainty)
         progress(f"searching sets of explanations (round {turn})")
+        if discrepancy:
+            both = zip(along, loads, strict=True)
+            known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in both]
+            found = selected(data, nuisances(robot, along, known, band, scales), chosen)
+            prob, g = problem(data, found.noise, blocks, settled=turn > 1)
+            return Explanation(lib, scales, data, found.noise, found.chosen, prob, g, found.chosen, factor, found)
         return _settled(lib, scales, data, factor, chosen, noise, blocks, settled=turn > 1)
 
     turn, coarse = 1, False
@@ -84,6 +102,8 @@ def explain(
         (lib, chosen), noise, coarse = _refined(ex), ex.noise, _coarse(ex)
         turn += 1
         del ex  # hundreds of megabytes, before the next
+    if discrepancy:
+        return explained(turn, BLOCKS)
     ex = _of_some_weight(explained(turn, BLOCKS))
     # The last search may have found another set than that whose noise it was weighted by.
     return explained_by(ex, ex.chosen)

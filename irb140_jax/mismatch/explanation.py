@@ -11,6 +11,7 @@ from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.problem import Problem
 from irb140_jax.mismatch.rows import Stretch
+from irb140_jax.mismatch.selection.selected import Selected
 
 SETTLED = 2  # rounds in which the noise and what leaves it agree
 
@@ -29,6 +30,7 @@ class Explanation:
         grams: Gram matrices by block.
         chosen: Indices of the candidates in the explanation.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
+        selected: What a search with model discrepancy found, where there was one.
     """
 
     lib: Library
@@ -40,6 +42,7 @@ class Explanation:
     grams: Grams
     chosen: tuple[int, ...]
     factor: np.ndarray
+    selected: Selected | None = None
 
     @property
     def members(self) -> list:
@@ -50,6 +53,13 @@ class Explanation:
         """Columns of the full model: inertials, then the amplitudes of the chosen candidates."""
         chosen = self.chosen if chosen is None else chosen
         return np.concatenate([np.arange(self.data.nuisances), self.problem.columns(chosen)])
+
+
+def estimate(ex: Explanation) -> Posterior:
+    """Posterior of inertials and chosen amplitudes, with the model discrepancy integrated out where there is one."""
+    if ex.selected and ex.selected.chosen == ex.chosen:
+        return ex.selected.posterior()
+    return full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
 
 
 def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:

@@ -3,28 +3,32 @@
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.certain import certain
-from irb140_jax.mismatch.explanation import Explanation, full_posterior, parts
+from irb140_jax.mismatch.explanation import Explanation, estimate, full_posterior, parts
 from irb140_jax.mismatch.intervals import others, parameters_of
 from irb140_jax.mismatch.name import PREFER
 from irb140_jax.mismatch.problem import best_of_groups
 from irb140_jax.mismatch.prove import held_out_gain, jackknife_factor
+from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.robot import Robot
 
 Key = tuple[str, tuple[int, ...]]  # an effect and its joints
 
+CERTAIN = 0.99  # probability that the torque scale is off by more than the inertials may be
 WORTH_SAYING = 0.02  # alternatives less probable than this stay unsaid
 
 
 def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     """The contract's findings, strongest first."""
-    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
-    widen = jackknife_factor(ex)
+    post = estimate(ex)
+    widen = np.ones(len(post.mean)) if ex.selected else jackknife_factor(ex)
+    plain = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     w = post.mean * ex.data.scale[post.columns]
     cov = post.cov * np.outer(widen, widen) * np.outer(ex.data.scale[post.columns], ex.data.scale[post.columns])
     out = []
@@ -32,7 +36,10 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         c = ex.data.candidates[index]
         if c.effect.silent:
             continue
-        values = parameters_of(robot, ex, index, w[rows], cov[rows, rows], float(np.max(widen[rows])))
+        spread = float(np.max(widen[rows]))
+        if ex.selected:  # shapes are judged by Gram matrices without discrepancy: they are as much too narrow
+            spread = float(np.max(np.sqrt(np.diag(post.cov)[rows] / np.diag(plain.cov)[rows]), initial=1.0))
+        values = parameters_of(robot, ex, index, w[rows], cov[rows, rows], spread)
         names = ", ".join(robot.joint_names[j] for j in c.joints)
         units = {k: v["unit"] for k, v in values.items()}
         out.append({
@@ -48,7 +55,37 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
             "certain": certain(robot, ex, index, w[rows], cov[rows, rows]),
             "alternatives": _alternatives(robot, ex, index),
         })  # fmt: skip
+    out += torque_scale_finding(robot, ex)
     return sorted(out, key=lambda f: -f["evidence"]["log_odds"])
+
+
+def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
+    """The torque of all joints logged too large or too small by one factor, where that is beyond what inertials may be.
+
+    A nuisance parameter with a stated prior, until its posterior says that it differs from one by more than the stated
+    uncertainty of the inertials.  Its odds are by Savage and Dickey's ratio of densities.
+    """
+    if ex.selected is None or ex.data.nuisances == 0:
+        return []
+    w, std = ex.selected.torque_scale()
+    least = float(ex.data.scale[0])
+    beyond = float(stats.norm.sf((least - w) / std) + stats.norm.cdf((-least - w) / std))
+    if beyond < CERTAIN:
+        return []
+    odds = stats.norm.logpdf(0.0, 0.0, GAIN_COMMON) - stats.norm.logpdf(0.0, w, std)
+    gain, spread = 1.0 / (1.0 + w), std / (1.0 + w) ** 2
+    return [{
+        "effect": "torque_gain",
+        "joints": list(robot.joint_names),
+        "where": f"all joints: in proportion to the whole torque; the real torque is {gain:.3g} x the logged",
+        "parameters": {"gain": {"value": gain, "std": spread, "unit": "1"}},
+        "evidence": {"log_odds": float(odds), "probability": beyond, "heldout_gain": 0.0},
+        "certain": (
+            f"The torque of all joints is logged {100 * abs(w):.3g} +- {100 * std:.2g} % too {'large' if w > 0 else 'small'} "
+            "for the stated masses; only a known payload tells wrong torque constants from masses all wrong alike."
+        ),
+        "alternatives": [],
+    }]  # fmt: skip
 
 
 def _rivals(ex: Explanation, index: int) -> tuple[dict[Key, float], dict[Key, str]]:
@@ -137,14 +174,21 @@ def _shares(odds: dict) -> dict:
 
 def _probability(ex: Explanation, index: int) -> float:
     c = ex.data.candidates[index]
+    if ex.selected:
+        return ex.selected.probability[c.slug, c.joints]
     return _shares(_rivals(ex, index)[0])[c.slug, c.joints]
 
 
 def _alternatives(robot: Robot, ex: Explanation, index: int) -> list[dict[str, Any]]:
     c = ex.data.candidates[index]
     best: dict[str, tuple[float, str]] = {}
-    odds, stays = _rivals(ex, index)
-    for key, p in _shares(odds).items():
+    stays: dict[Key, str] = {}
+    if ex.selected:
+        shares = {k: p for k, p in ex.selected.rivals(index).items() if k[0] not in SILENT}
+    else:
+        odds, stays = _rivals(ex, index)
+        shares = _shares(odds)
+    for key, p in shares.items():
         slug = key[0]
         if slug and slug != c.slug and p > WORTH_SAYING:
             best[slug] = max(best.get(slug, (0.0, "")), (p, stays.get(key, "")))

@@ -7,7 +7,6 @@ inertials, effects and y; sums of those over joints are all that a search needs.
 
 import dataclasses
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 from scipy import linalg
@@ -19,7 +18,7 @@ from irb140_jax.mismatch.regression.nuisances import SCALED, Nuisances
 SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)  # of a block, as a share of the joint's torque
 USUAL = 0.03  # share of the torque that laws are usually wrong by: scale of the half-Cauchy prior
 LEVELS = tuple(1.25**k for k in range(0, 24))  # noise over the sensors' level
-ROUNDING = 1e-11
+REMEMBERED = 128  # factors of a joint
 
 Setting = tuple[int, ...]  # indices into SIZES for each block of SCALED, and into LEVELS
 
@@ -33,15 +32,17 @@ def log_prior(setting: Setting) -> float:
 
 
 @dataclasses.dataclass(frozen=True)
-class Reduced:
-    """A joint's Gram matrix with its own nuisances integrated out.
+class Factor:
+    """What integrating out a joint's own nuisances takes, at some sizes and a noise level.
 
     Attributes:
-        H: Over the joint's shared columns and y, shape (k + 1, k + 1).
+        half: What integrating them out takes off the Gram matrix of shared columns and y, half.T @ half, (D, k + 1).
+        level: Noise over the sensors' level.
         constant: What this adds to the log evidence: log determinants, noise level and prior of the sizes.
     """
 
-    H: np.ndarray
+    half: np.ndarray
+    level: float
     constant: float
 
 
@@ -57,34 +58,49 @@ class JointGram:
 
     def __init__(self, index: np.ndarray, blocks: np.ndarray, groups: np.ndarray, rows: np.ndarray):
         self.index, self.blocks, self.groups, self.rows = index, blocks, groups, rows
-        self._reduced: dict[Setting, Reduced] = {}
+        self.total = blocks.sum(axis=0)
+        self._factors: dict[Setting, Factor] = {}
 
-    @cached_property
-    def total(self) -> np.ndarray:
-        """Sum over blocks."""
-        return self.blocks.sum(axis=0)
+    def factor(self, setting: Setting) -> Factor:
+        """See `Factor`; kept, for a search asks for the same ones thousands of times."""
+        if setting not in self._factors:
+            if len(self._factors) >= REMEMBERED:
+                self._factors.pop(next(iter(self._factors)))
+            self._factors[setting] = self._factor(setting)
+        return self._factors[setting]
 
-    def reduced(self, setting: Setting) -> Reduced:
-        """The Gram matrix with own nuisances integrated out at these sizes and this level."""
-        if setting not in self._reduced:
-            self._reduced[setting] = self._reduce(setting)
-        return self._reduced[setting]
-
-    def _reduce(self, setting: Setting) -> Reduced:
-        level, D = LEVELS[setting[-1]], len(self.groups)
-        size = own_scale(self.groups, setting)
+    def _factor(self, setting: Setting) -> Factor:
+        level, size = LEVELS[setting[-1]], own_scale(self.groups, setting)
         used = np.flatnonzero(size > 0.0)
-        G = self.total / level**2
-        half, logdet = np.zeros((0, G.shape[0] - D)), 0.0
-        if len(used):
-            s = size[used]
-            M = s[:, None] * G[np.ix_(used, used)] * s + np.eye(len(used))
-            chol = linalg.cholesky(M, lower=True)
-            half = linalg.solve_triangular(chol, s[:, None] * G[used, D:], lower=True)
-            logdet = 2.0 * float(np.log(np.diag(chol)).sum())
-        H = G[D:, D:] - half.T @ half + ROUNDING * np.diag(np.diag(G[D:, D:]))
-        constant = -0.5 * logdet - float(self.rows.sum()) * np.log(level) - 0.5 * H[-1, -1] + log_prior(setting)
-        return Reduced(H, float(constant))
+        s = size[used]
+        M = s[:, None] * self.total[np.ix_(used, used)] * s / level**2 + np.eye(len(used))
+        chol = linalg.cholesky(M, lower=True)
+        D = len(self.groups)
+        half = linalg.solve_triangular(chol, s[:, None] * self.total[used, D:] / level**2, lower=True)
+        left = self.total[-1, -1] / level**2 - half[:, -1] @ half[:, -1]
+        constant = -float(np.log(np.diag(chol)).sum()) - float(self.rows.sum()) * np.log(level) - 0.5 * left
+        return Factor(half, level, constant + log_prior(setting))
+
+    def left(self, setting: Setting, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Gram matrix of some shared columns with others, own nuisances integrated out; numbered as in `index`."""
+        f, D = self.factor(setting), len(self.groups)
+        return self.total[np.ix_(rows + D, columns + D)] / f.level**2 - f.half[:, rows].T @ f.half[:, columns]
+
+    def own(self, setting: Setting, groups: np.ndarray) -> np.ndarray:
+        """Such Gram matrices of many small groups of columns; -1 stands for one that does not move this joint.
+
+        Args:
+            setting: Sizes and level.
+            groups: Shape (m, k).
+
+        Returns:
+            Shape (m, k, k).
+        """
+        f, at, there = self.factor(setting), groups + len(self.groups), groups >= 0
+        G = self.total[at[:, :, None], at[:, None, :]] / f.level**2
+        part = f.half[:, groups]
+        G = G - np.einsum("amk,aml->mkl", part, part, optimize=True)
+        return np.where(there[:, :, None] & there[:, None, :], G, 0.0)
 
 
 def own_scale(groups: np.ndarray, setting: Setting) -> np.ndarray:

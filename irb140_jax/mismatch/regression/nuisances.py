@@ -34,23 +34,28 @@ class Nuisances:
 
 
 def nuisances(
-    robot: Robot, along: Sequence[Prepared], loads: Sequence[np.ndarray], band: Band, scales: Scales
+    robot: Robot,
+    along: Sequence[Prepared],
+    torques: Sequence[tuple[np.ndarray, np.ndarray]],
+    band: Band,
+    scales: Scales,
 ) -> list[Nuisances]:
     """Columns of all recordings; features of the discrepancy have the RMS of the joint's torque over all of them.
 
     Args:
         robot: The nominal model.
         along: The recordings with what the rigid body does along them.
-        loads: Torque of the model as corrected so far along each, shape (T, n) [N m or N].
+        torques: Of the model as corrected so far along each: without friction, and all of it, (T, n) [N m or N].
+            A torque scale multiplies the former: friction is stated in the torque that was logged.
         band: Of the comparison.
         scales: Sizes over all recordings.
     """
     n, count = robot.n, len(along)
     raw: list[list[list[np.ndarray]]] = []  # recording, joint, block
     commons = []
-    for r, (a, load) in enumerate(zip(along, loads, strict=True)):
+    for r, (a, (load, total)) in enumerate(zip(along, torques, strict=True)):
         motion, dt = a.recording, float(np.mean(np.diff(a.recording.t)))
-        rate = np.gradient(load, dt, axis=0)
+        rate = np.gradient(total, dt, axis=0)
         bend = SMOOTHED * np.gradient(rate, dt, axis=0)
         commons.append(band.apply(np.stack([GAIN_COMMON * load, DELAY_COMMON * rate, 2.0 * bend], axis=-1)))
         joints = []
@@ -59,8 +64,8 @@ def nuisances(
             fixed = np.stack([GAIN_JOINT * load[:, j], DELAY_JOINT * rate[:, j], rotor, bend[:, j]], axis=1)
             slope = np.zeros((len(motion.t), count))
             slope[:, r] = motion.direction[:, j]
-            blocks = (fixed, smooth_features(motion, load, scales, j), reversal_features(motion, load, scales, j), slope)
-            joints.append([band.apply(b) for b in blocks])
+            features = [f(motion, load, scales, j) for f in (smooth_features, reversal_features)]
+            joints.append([band.apply(b) for b in (fixed, *features, slope)])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
     for j in range(n):

@@ -22,6 +22,7 @@ class Space:
     Attributes:
         joints: Gram matrices of each joint.
         candidates: What may be in a set; columns count from `offset`.
+        inertials: Shared columns of the inertial parameters, which come first.
         offset: Shared columns before the amplitudes: inertials and common nuisances, always in.
         size: Shared columns, without y.
         log_prior: Log prior odds of each candidate, shape (candidates,).
@@ -30,6 +31,7 @@ class Space:
 
     joints: tuple[JointGram, ...]
     candidates: tuple[Candidate, ...]
+    inertials: int
     offset: int
     size: int
     log_prior: np.ndarray
@@ -53,8 +55,8 @@ class Space:
         """
         out = self.beside.conflicts(chosen)
         for alike in (self._dry, self._late):
-            taken = (self._acts[:, list(chosen)] & alike[list(chosen)]).any(axis=1)
-            out = out | (alike & (self._acts & taken[:, None]).any(axis=0))
+            taken = np.any(self._acts[:, list(chosen)] & alike[list(chosen)], axis=1)
+            out = out | (alike & np.any(self._acts & taken.reshape(-1, 1), axis=0))
         return out
 
     @cached_property
@@ -67,7 +69,7 @@ class Space:
 
     @cached_property
     def _dry(self) -> np.ndarray:
-        return np.array([DRY == c.slug or DRY in c.effect.contains for c in self.candidates])
+        return np.array([DRY == c.slug or DRY in c.effect.contains for c in self.candidates], dtype=bool)
 
     @cached_property
     def _late(self) -> np.ndarray:
@@ -89,15 +91,19 @@ class Space:
             out.append(place)
         return tuple(out)
 
-    def summed(self, settings: Settings, columns: np.ndarray, only: Sequence[int] | None = None) -> np.ndarray:
-        """Gram matrix of some shared columns and y, summed over joints, shape (len(columns) + 1,) * 2."""
-        index = np.append(columns, self.size)
-        H = np.zeros((len(index), len(index)))
+    def summed(
+        self, settings: Settings, rows: np.ndarray, columns: np.ndarray, only: Sequence[int] | None = None
+    ) -> np.ndarray:
+        """Gram matrix of some shared columns with others, summed over joints; number `size` is y."""
+        H = np.zeros((len(rows), len(columns)))
         for j in range(len(self.joints)) if only is None else only:
-            at = self._place[j][index]
-            mine = np.flatnonzero(at >= 0)
-            H[np.ix_(mine, mine)] += self.joints[j].reduced(settings[j]).H[np.ix_(at[mine], at[mine])]
+            across, down = self._place[j][rows], self._place[j][columns]
+            r, c = np.flatnonzero(across >= 0), np.flatnonzero(down >= 0)
+            H[np.ix_(r, c)] += self.joints[j].left(settings[j], across[r], down[c])
         return H
+
+    def _with_y(self, columns: np.ndarray) -> np.ndarray:
+        return np.append(columns, self.size)
 
     def set_columns(self, chosen: Sequence[int]) -> np.ndarray:
         """Shared columns of a set: inertials and common nuisances, then the members' amplitudes."""
@@ -105,13 +111,15 @@ class Space:
 
     def log_evidence(self, chosen: Sequence[int], settings: Settings) -> float:
         """Log evidence and prior of a set; -inf where its amplitudes are inadmissible."""
-        H = self.summed(settings, self.set_columns(chosen))
-        constant = sum(g.reduced(s).constant for g, s in zip(self.joints, settings, strict=True))
+        every = self._with_y(self.set_columns(chosen))
+        H = self.summed(settings, every, every)
+        constant = sum(g.factor(s).constant for g, s in zip(self.joints, settings, strict=True))
         return constant + float(sum(self.log_prior[c] for c in chosen)) + _solved(H, self._bounds(chosen))[0]
 
     def posterior(self, chosen: Sequence[int], settings: Settings) -> tuple[np.ndarray, np.ndarray]:
         """Mean and covariance of inertials, common nuisances and amplitudes, in prior units."""
-        H = self.summed(settings, self.set_columns(chosen))
+        every = self._with_y(self.set_columns(chosen))
+        H = self.summed(settings, every, every)
         cov = np.linalg.inv(H[:-1, :-1] + np.eye(len(H) - 1))
         return cov @ H[:-1, -1], cov
 
@@ -123,25 +131,25 @@ class Space:
         Returns:
             Log evidence and prior of the set, and the settings.
         """
-        joints, columns = range(len(self.joints)) if joints is None else joints, self.set_columns(chosen)
-        index = np.append(columns, self.size)
+        joints = range(len(self.joints)) if joints is None else joints
+        index = self._with_y(self.set_columns(chosen))
         prior, best, moved = float(sum(self.log_prior[c] for c in chosen)), -np.inf, True
         bounds = self._bounds(chosen)
         while moved:
             moved = False
             for j in joints:
-                rest = self.summed(settings, columns, [i for i in range(len(self.joints)) if i != j])
+                rest = self.summed(settings, index, index, [i for i in range(len(self.joints)) if i != j])
                 constant = prior + sum(
-                    g.reduced(s).constant for i, (g, s) in enumerate(zip(self.joints, settings, strict=True)) if i != j
+                    g.factor(s).constant for i, (g, s) in enumerate(zip(self.joints, settings, strict=True)) if i != j
                 )
                 at = self._place[j][index]
                 mine = np.flatnonzero(at >= 0)
-                into, take = np.ix_(mine, mine), np.ix_(at[mine], at[mine])
+                into, take = np.ix_(mine, mine), at[mine]
 
                 def value(setting: Setting, j=j, rest=rest, constant=constant, into=into, take=take) -> float:
-                    part, H = self.joints[j].reduced(setting), rest.copy()
-                    H[into] += part.H[take]
-                    return constant + part.constant + _solved(H, bounds)[0]
+                    H = rest.copy()
+                    H[into] += self.joints[j].left(setting, take, take)
+                    return constant + self.joints[j].factor(setting).constant + _solved(H, bounds)[0]
 
                 now = value(settings[j])
                 best = max(best, now) if np.isfinite(now) else best
@@ -164,7 +172,7 @@ class Space:
         return np.concatenate([-free, *low]), np.concatenate([free, *high])
 
     def gains(self, chosen: Sequence[int], settings: Settings, which: np.ndarray) -> np.ndarray:
-        """What each of some candidates adds to the log evidence and prior of a set at these settings; -inf if inadmissible."""
+        """Log posterior odds of adding each of some candidates to a set at these settings; -inf if inadmissible."""
         out = np.full(len(which), -np.inf)
         if not len(which):
             return out
@@ -172,18 +180,25 @@ class Space:
         extra = np.unique(np.concatenate([self.columns[i] for i in which]))
         number = np.full(self.size, -1)
         number[extra] = np.arange(len(extra))
-        H = self.summed(settings, np.concatenate([base, extra]))
-        b = len(base)
-        chol = linalg.cholesky(H[:b, :b] + np.eye(b), lower=True)
-        half = linalg.solve_triangular(chol, H[:b, b:], lower=True)
-        left = H[b:, b:] - half.T @ half
+        prior = np.eye(len(base))
+        chol = linalg.cholesky(self.summed(settings, base, base) + prior, lower=True, check_finite=False)
+        beside = self.summed(settings, base, self._with_y(extra))
+        half = linalg.solve_triangular(chol, beside, lower=True, check_finite=False)
+        with_y = self.summed(settings, extra, np.array([self.size]))[:, 0] - half[:, :-1].T @ half[:, -1]
         by_size: dict[int, list[int]] = {}
-        for k, i in enumerate(which):
-            by_size.setdefault(len(self.columns[i]), []).append(k)
+        for m, i in enumerate(which):
+            by_size.setdefault(len(self.columns[i]), []).append(m)
         for k, members in by_size.items():
-            cols = np.array([number[self.columns[which[m]]] for m in members])
-            M = left[cols[:, :, None], cols[:, None, :]] + np.eye(k)
-            rhs = left[cols, -1]
+            columns = np.array([self.columns[which[m]] for m in members])
+            at = number[columns]
+            part = half[:, at]
+            M = np.eye(k) - np.einsum("amk,aml->mkl", part, part, optimize=True)
+            for g, setting, place in zip(self.joints, settings, self._place, strict=True):
+                mine = place[columns]
+                moved = np.flatnonzero((mine >= 0).any(axis=1))
+                if len(moved):
+                    M[moved] += g.own(setting, mine[moved])
+            rhs = with_y[at]
             mean = np.linalg.solve(M, rhs[..., None])[..., 0]
             gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
             ids = which[members]
@@ -207,7 +222,7 @@ def _solved(H: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]) -> tuple[float
     """Log evidence of amplitudes with unit priors from a Gram matrix whose last column is y, and their mean."""
     chol = linalg.cholesky(H[:-1, :-1] + np.eye(len(H) - 1), lower=True, check_finite=False)
     half = linalg.solve_triangular(chol, H[:-1, -1], lower=True, check_finite=False)
-    mean = linalg.solve_triangular(chol, half, lower=True, trans="T", check_finite=False)
+    mean = linalg.solve_triangular(chol, half, lower=True, trans=1, check_finite=False)
     if np.any(mean < bounds[0] - 1e-9) or np.any(mean > bounds[1] + 1e-9):
         return -np.inf, mean
     return 0.5 * float(half @ half) - float(np.log(np.diag(chol)).sum()), mean

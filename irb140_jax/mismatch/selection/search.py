@@ -59,9 +59,13 @@ class Search:
                 best = other
         return best
 
-    def screened(self, chosen: frozenset[int], joint: int, most: int = BEST, avoid: frozenset[str] = frozenset()) -> list[int]:
-        """The most promising candidates at a joint beside a set: the best of each kind and site, by the sum over both
-        the set's own settings and settings with less discrepancy and noise."""
+    def screened(
+        self, chosen: frozenset[int], joint: int, most: int = BEST, avoid: frozenset[str] = frozenset()
+    ) -> list[int]:
+        """The most promising candidates at a joint beside a set, the best of each kind and site.
+
+        By the set's own settings or by those with less discrepancy and noise, whichever makes more of them.
+        """
         space, settings = self.space, self.visited[chosen][1]
         bad = space.conflicts(tuple(chosen))
         which = np.array([i for i in space.touching[joint] if not bad[i] and i not in chosen
@@ -72,12 +76,11 @@ class Search:
         lower = tuple(max(k - 2, 0) for k in own)
         lowest = (*(min(k, 1) for k in own[:-1]), max(own[-1] - 6, 0))
         best = np.full(len(which), -np.inf)
-        here = space.log_evidence(tuple(chosen), settings)
         for other in dict.fromkeys((own, lower, lowest)):
             trial = (*settings[:joint], other, *settings[joint + 1 :])
-            base = space.log_evidence(tuple(chosen), trial) - here
-            gained = space.gains(tuple(chosen), trial, which)
-            best = np.maximum(best, base + gained) if np.isfinite(base) else best
+            base = space.log_evidence(tuple(chosen), trial)
+            if np.isfinite(base):
+                best = np.maximum(best, base + space.gains(tuple(chosen), trial, which))
         kinds: dict[tuple[str, tuple[int, ...]], int] = {}
         for k in np.argsort(-best):
             c = space.candidates[which[k]]

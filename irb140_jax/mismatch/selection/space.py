@@ -35,7 +35,8 @@ def space_of(data: Data, extra: Sequence[Nuisances], noise: Noise) -> Space:
     # three in each of ten parameters.
     held = any(c.effect.tied and data.scale[data.nuisances + c.columns[0]] > 0.0 for c in data.candidates)
     last = data.stretches[0].y.shape[1] - 1
-    rare -= [10.0 * np.log(3.0) if held and c.slug == "inertials" and c.joints == (last,) else 0.0 for c in data.candidates]
+    doubly = [held and c.slug == "inertials" and c.joints == (last,) for c in data.candidates]
+    rare -= 10.0 * np.log(3.0) * np.array(doubly)
     usual = np.log(COMMON / (1.0 - COMMON))
     log_prior = np.where([c.effect.ordinary for c in data.candidates], usual, rare)
     width = max(len(c.columns) for c in data.candidates)
@@ -49,6 +50,6 @@ def space_of(data: Data, extra: Sequence[Nuisances], noise: Noise) -> Space:
         if c.slug == "time_delay" and moves.all():  # a slope over some time is a delay of about that time
             lowest[i, 0], highest[i, 0] = (2.0 * c.shape[0] + np.array([-2e-3, 2e-3])) / s[0]
     return Space(
-        joint_grams(data, extra, noise), data.candidates, data.nuisances + common, len(data.scale) + common, log_prior,
-        lowest, highest,
+        joint_grams(data, extra, noise), data.candidates, data.nuisances, data.nuisances + common,
+        len(data.scale) + common, log_prior, lowest, highest,
     )  # fmt: skip

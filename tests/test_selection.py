@@ -1,0 +1,139 @@
+"""The evidence of sets with model discrepancy, against the density of the data itself; the search on planted sets."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.regression.gram import LEVELS, SIZES, JointGram, log_prior, own_scale
+from irb140_jax.mismatch.selection.averages import probabilities
+from irb140_jax.mismatch.selection.evidence import Space
+from irb140_jax.mismatch.selection.search import Search
+
+ROWS, INERTIALS, COMMON, OWN = 60, 3, 1, 5
+SLUGS = ("coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia")
+GROUPS = np.array([-1, 0, 0, 1, 2])
+SETTING = (3, 4, 2, 1)
+
+
+def planted(seed: int, amplitudes: dict[int, float]) -> tuple[Space, list[dict[str, np.ndarray]]]:
+    """Two joints with four candidates each, of one column; what is planted is their sum and unit noise.
+
+    Returns:
+        The space, and each joint's own columns E, shared columns X and torque y.
+    """
+    rng = np.random.default_rng(seed)
+    size = INERTIALS + COMMON + 2 * len(SLUGS)
+    candidates, joints, data = [], [], []
+    for j in range(2):
+        for k, slug in enumerate(SLUGS):
+            columns = np.array([len(SLUGS) * j + k])
+            free = np.array([np.inf])
+            candidates.append(Candidate(CATALOGUE[slug], (j,), np.zeros(0), columns, (0,), -free, free))
+        mine = [*range(INERTIALS + COMMON), *(INERTIALS + COMMON + len(SLUGS) * j + k for k in range(len(SLUGS)))]
+        E, X = rng.normal(size=(ROWS, OWN)), rng.normal(size=(ROWS, len(mine)))
+        y = rng.normal(size=ROWS)
+        for c, w in amplitudes.items():
+            if c // len(SLUGS) == j:
+                y = y + w * X[:, INERTIALS + COMMON + c % len(SLUGS)]
+        A = np.column_stack([E, X, y])
+        joints.append(JointGram(np.array([*mine, size]), (A.T @ A)[None], GROUPS, np.array([ROWS])))
+        data.append({"E": E, "X": X, "y": y, "mine": np.array(mine)})
+    prior = np.full(len(candidates), np.log(0.05))
+    free = np.full((len(candidates), 1), np.inf)
+    space = Space(tuple(joints), tuple(candidates), INERTIALS, INERTIALS + COMMON, size, prior, -free, free)
+    return space, data
+
+
+def density(space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], settings) -> float:
+    """Log density of both joints' torque with every unknown integrated out by its covariance: no Gram matrices."""
+    columns = space.set_columns(chosen)
+    shared, blocks = [], []
+    for d, setting in zip(data, settings, strict=True):
+        wide = np.zeros((ROWS, space.size))
+        wide[:, d["mine"]] = d["X"]
+        shared.append(wide[:, columns])
+        E = d["E"] * own_scale(GROUPS, setting)
+        blocks.append(E @ E.T + LEVELS[setting[-1]] ** 2 * np.eye(ROWS))
+    Z = np.concatenate(shared)
+    cov = Z @ Z.T
+    cov[:ROWS, :ROWS] += blocks[0]
+    cov[ROWS:, ROWS:] += blocks[1]
+    y = np.concatenate([d["y"] for d in data])
+    return float(stats.multivariate_normal(np.zeros(len(y)), cov).logpdf(y)) + 0.5 * len(y) * np.log(2.0 * np.pi)
+
+
+@pytest.mark.parametrize("chosen", [(), (0,), (1, 6), (0, 3, 5)])
+def test_the_evidence_of_a_set_is_the_density_of_the_data(chosen):
+    space, data = planted(1, {0: 1.0, 5: 0.5})
+    settings = (SETTING, (0, 2, 6, 0))
+    expected = density(space, data, chosen, settings) + sum(map(log_prior, settings)) + len(chosen) * np.log(0.05)
+    assert space.log_evidence(chosen, settings) == pytest.approx(expected, abs=1e-8)
+
+
+def test_screening_says_what_the_evidence_says():
+    space, _ = planted(2, {2: 1.0})
+    settings, which = (SETTING, SETTING), np.array([0, 1, 3, 5])
+    before = space.log_evidence((2,), settings)
+    expected = [space.log_evidence((2, int(i)), settings) - before for i in which]
+    np.testing.assert_allclose(space.gains((2,), settings, which), expected, atol=1e-8)
+
+
+def test_the_posterior_is_that_of_the_data():
+    space, data = planted(3, {1: 1.0})
+    settings, chosen = (SETTING, (2, 0, 0, 3)), (1, 4)
+    mean, cov = space.posterior(chosen, settings)
+    columns, precision, moment = space.set_columns(chosen), np.eye(INERTIALS + COMMON + 2), 0.0
+    for d, setting in zip(data, settings, strict=True):
+        wide = np.zeros((ROWS, space.size))
+        wide[:, d["mine"]] = d["X"]
+        E = d["E"] * own_scale(GROUPS, setting)
+        inverse = np.linalg.inv(E @ E.T + LEVELS[setting[-1]] ** 2 * np.eye(ROWS))
+        precision = precision + wide[:, columns].T @ inverse @ wide[:, columns]
+        moment = moment + wide[:, columns].T @ inverse @ d["y"]
+    np.testing.assert_allclose(cov, np.linalg.inv(precision), atol=1e-10)
+    np.testing.assert_allclose(mean, np.linalg.solve(precision, moment), atol=1e-10)
+
+
+def test_settings_that_are_settled_have_no_better_neighbour_one_step_away():
+    space, _ = planted(4, {0: 2.0})
+    value, settings = space.settled((0,), (SETTING, SETTING))
+    assert value == pytest.approx(space.log_evidence((0,), settings))
+    for j in range(2):
+        for axis in range(len(SETTING)):
+            for step in (-1, 1):
+                trial = list(settings[j])
+                trial[axis] += step
+                if 0 <= trial[axis] < (len(LEVELS) if axis == len(SETTING) - 1 else len(SIZES)):
+                    other = tuple(tuple(trial) if i == j else s for i, s in enumerate(settings))
+                    assert space.log_evidence((0,), other) <= value + 2e-3
+
+
+@pytest.mark.parametrize("true", [(), (0,), (1, 6), (0, 2, 5)])
+def test_the_search_finds_what_was_planted_and_is_sure_of_it(true):
+    space, _ = planted(5, dict.fromkeys(true, 2.0))
+    search = Search(space, ((0, 0, 0, 0),) * 2)
+    assert search.run() == true
+    sure = probabilities(search)
+    for c, candidate in enumerate(space.candidates):
+        p = sure.get((candidate.slug, candidate.joints), 0.0)
+        assert p > 0.99 if c in true else p < 0.3, (candidate.slug, candidate.joints, p)
+
+
+def test_amplitudes_that_are_not_admissible_make_a_set_impossible():
+    space, _ = planted(6, {0: 2.0})
+    lowest = space.lowest.copy()
+    lowest[0] = 10.0
+    bounded = dataclasses.replace(space, lowest=lowest)
+    assert bounded.log_evidence((0,), (SETTING, SETTING)) == -np.inf
+    assert bounded.gains((), (SETTING, SETTING), np.array([0]))[0] == -np.inf
+    assert 0 not in Search(bounded, (SETTING, SETTING)).run()
+
+
+def test_the_prior_of_the_sizes_is_a_probability():
+    total = sum(np.exp(log_prior((k, 0, 0, 0)) - log_prior((0, 0, 0, 0))) for k in range(len(SIZES)))
+    first = 2.0 / np.pi * np.arctan(0.5 * SIZES[1] / 0.03)
+    assert total * first == pytest.approx(1.0)
