@@ -1,6 +1,7 @@
 """A file to a checked `Recording`: the way in for everything a user measured."""
 
 import dataclasses
+import hashlib
 import pathlib
 import re
 from typing import Literal
@@ -40,13 +41,14 @@ def read_recording(
         RecordingError: It can't be used; the message says file, column, row (counted from 1 below the header), what is
             wrong and what would mend it.
     """
-    recording = unchecked_recording(pathlib.Path(path), robot.joint_names, columns, torque=torque)
+    path = pathlib.Path(path)
+    recording = unchecked_recording(path, robot.joint_names, columns, torque=torque)
     recording = repair.without_glitches(repair.unwrapped(recording, robot.is_slide))
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
     if recording.has_torque:
         check_against_model(recording, seen, robot)
-    return dataclasses.replace(recording, source=pathlib.Path(path).name)
+    return dataclasses.replace(recording, source=path.name, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 def unchecked_recording(
@@ -98,7 +100,7 @@ def unchecked_recording(
         q=stacked([f"q.{joint}" for joint in joint_names]),
         tau=(stacked([f"tau.{joint}" for joint in joint_names]) if has_torque
              else np.full((len(table["t"]), len(joint_names)), np.nan)),
-        **{kind: stacked(names) for kind, names in complete.items()},
+        **{kind: stacked(names) for kind, names in complete.items()},  # pyright: ignore[reportArgumentType]
         extras={name: values for name, values in table.items() if name not in kept},
         file_t=file_t if len(file_t) > len(table["t"]) else None,
     )
