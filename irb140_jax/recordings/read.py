@@ -1,7 +1,6 @@
 """A file to a checked `Recording`: the way in for everything a user measured."""
 
 import dataclasses
-import hashlib
 import pathlib
 import re
 from typing import Literal
@@ -14,6 +13,7 @@ from irb140_jax.recordings.check import check_motion, check_times
 from irb140_jax.recordings.check_model import check_against_model
 from irb140_jax.recordings.column_file import read_column_map
 from irb140_jax.recordings.columns import ColumnMap, closest, renamed, scaled, what_came
+from irb140_jax.recordings.formats.opened import checksum
 from irb140_jax.recordings.glance import glance
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.table import read_table
@@ -26,12 +26,12 @@ def read_recording(
     path: str | pathlib.Path, robot: Robot, columns: str | pathlib.Path | None = None, *,
     torque: Literal["required", "optional"] = "required",
 ) -> Recording:
-    """Read a recording of this robot from CSV, Parquet or NPZ and check it.
+    """Read a recording of this robot, in any format of `recordings.table`, and check it.
 
     Args:
         path: The file; its columns are t, q.<joint>, tau.<joint> and where logged qd.<joint>, qdd.<joint>, SI units.
         robot: The model of the robot that was recorded; gives the joints' names and what torque is plausible.
-        columns: A TOML file that maps other names and units, see `recordings.columns`.
+        columns: A TOML file that maps other names, units and sides, see `docs/columns.md`.
         torque: Whether columns tau.<joint> have to be there; a planned motion has none, and its `tau` is NaN.
 
     Returns:
@@ -48,7 +48,7 @@ def read_recording(
     recording = check_motion(recording, seen, robot)
     if recording.has_torque:
         check_against_model(recording, seen, robot)
-    return dataclasses.replace(recording, source=path.name, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
+    return dataclasses.replace(recording, source=path.name, sha256=checksum(path))
 
 
 def unchecked_recording(

@@ -2,6 +2,7 @@
 
 import bz2
 import gzip
+import hashlib
 import lzma
 import pathlib
 import stat
@@ -35,6 +36,16 @@ def check_regular(path: pathlib.Path) -> None:
         raise RecordingError(f"{path}: can't open this file: {reason}; check the path") from error
     if status.st_size == 0:
         raise RecordingError(f"{path}: this file is empty; give a recording with a header and one row a sample")
+
+
+def checksum(path: pathlib.Path) -> str:
+    """SHA-256 of a file; of a folder, as ROS 2 bags are, that of the names and checksums of its files."""
+    if path.is_dir():
+        inside = sorted(inner for inner in path.iterdir() if inner.is_file())
+        lines = "".join(f"{checksum(inner)}  {inner.name}\n" for inner in inside)
+        return hashlib.sha256(lines.encode()).hexdigest()
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def unpacked(path: pathlib.Path) -> bytes:
