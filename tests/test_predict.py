@@ -67,7 +67,7 @@ def test_measured_torque_models_and_residuals_are_in_one_table(folder, recording
         "t", *(f"tau_{kind}.{joint}" for kind in ("measured", *models) for joint in JOINTS),
         *(f"residual_{model}.{joint}" for model in models for joint in JOINTS),
     ]  # fmt: skip
-    pd.testing.assert_frame_equal(table[list(predicted)], predicted)
+    pd.testing.assert_frame_equal(table.loc[:, list(predicted)], predicted)
     given = pd.read_csv(recording)
     for joint in JOINTS:
         np.testing.assert_allclose(table[f"tau_measured.{joint}"], given[f"tau.{joint}"], rtol=1e-8, atol=1e-12)

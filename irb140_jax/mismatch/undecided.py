@@ -228,7 +228,7 @@ def from_arrays(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Undecide
         pairs=tuple(Pair(**{k: _tuples(v) for k, v in p.items()}) for p in meta["pairs"]),
         **{k: _tuples(meta[k]) for k in ("chosen", "loose", "hidden")}, uncertainty=meta["uncertainty"],
         band=Band(**meta["band"]), scales=Scales(duration=meta["duration"], **sizes),
-        **{k: v for k, v in arrays.items() if k not in sizes},
+        **{k: v for k, v in arrays.items() if k not in sizes},  # pyright: ignore[reportArgumentType]
     )  # fmt: skip
 
 

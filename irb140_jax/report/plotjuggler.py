@@ -25,7 +25,7 @@ def write_layout(table: Mapping[str, np.ndarray], csv: str, joints: Sequence[str
         path: Of the layout.
     """
     root = ET.Element("root")
-    tabs = ET.SubElement(root, "tabbed_widget", name="Main Window", parent="main_window")
+    tabs = ET.SubElement(root, "tabbed_widget", {"name": "Main Window", "parent": "main_window"})
     for joint in joints:
         mine = [name for name in table if name.endswith(f".{joint}") and name.split(".", 1)[1] == joint]
         shown = [[n for n in mine if n.startswith(start)] for start in ("tau_", "residual_")]
