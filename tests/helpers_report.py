@@ -17,7 +17,7 @@ def example_diagnosis() -> dict:
             "noise_floor": None if name == "joint6" else 0.42 / (1 + i),
         }
     return {
-        "schema": 1,
+        "schema": 2,
         "verdict": "physics_left_out",
         "findings": [
             {
@@ -29,7 +29,8 @@ def example_diagnosis() -> dict:
                     "static": {"value": 12.913, "std": 0.31, "unit": "N m"},
                     "stribeck_velocity": {"value": 0.1173, "std": 0.0089, "unit": "rad/s"},
                 },
-                "evidence": {"delta_bic": 1843.7, "probability": 0.97, "heldout_gain": 0.88},
+                "certain": "Beyond what rigid bodies explain, the torque needs 8.9 N m RMS on joint2.",
+                "evidence": {"log_odds": 1843.7, "probability": 0.97, "heldout_gain": 0.88},
                 "alternatives": [
                     {
                         "effect": "load_dependent_friction",
@@ -43,7 +44,8 @@ def example_diagnosis() -> dict:
                 "joints": ["joint5", "joint6"],
                 "where": "On joint5 and joint6, in proportion to the difference of their speeds.",
                 "parameters": {"viscous": {"value": 2.31, "std": 0.04, "unit": "N m s/rad"}},
-                "evidence": {"delta_bic": 412.2, "probability": 0.999, "heldout_gain": 0.61},
+                "certain": "Beyond what rigid bodies explain, the torque needs 1.2 N m RMS on joint5.",
+                "evidence": {"log_odds": 412.2, "probability": 0.999, "heldout_gain": 0.61},
                 "alternatives": [],
             },
         ],
@@ -64,6 +66,21 @@ def example_diagnosis() -> dict:
             {"effect": "backlash", "joints": list(JOINTS), "needs": "An encoder on the link side."},
         ],
         "fit": fit,
+        "notes": [
+            "wave_2.csv: 14 samples were missing and the gaps were left out.",
+            "Velocities and accelerations come from the positions, smoothed below 12 Hz.",
+        ],
+        "provenance": {
+            "version": "0.1.0",
+            "command": "irb140 diagnose wave_1.csv wave_2.csv wave_3.csv --inertial-uncertainty 0.05",
+            "robot": {"name": "irb140", "joints": list(JOINTS), "sha256": "5e" * 32},
+            "recordings": [
+                {"file": f"wave_{i}.csv", "sha256": f"{i}a" * 32, "rows": 7501, "rate": 250.0, "duration": 30.0}
+                for i in (1, 2, 3)
+            ],
+            "options": {"inertial_uncertainty": 0.05, "effects": "all"},
+            "date": "2026-03-14",
+        },
         "summary": "The model leaves out Stribeck friction on joint2 and a coupling of joint5 and joint6. "
         "With both, the torque error on unseen data falls from 3.1 to 0.4 N m; on joint5 a third of what is left has a "
         "cause that the library does not know.",

@@ -1,8 +1,10 @@
 """The main job, end to end, in processes of their own: hide, diagnose, reveal; diagnose again; predict."""
 
+import hashlib
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -11,7 +13,7 @@ import pandas as pd
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[1]
-VERDICTS = {"no_mismatch", "parameters_only", "physics_left_out", "unexplained"}
+VERDICTS = {"no_mismatch", "parameters_only", "physics_left_out", "unexplained", "undecided"}
 
 
 @pytest.fixture(scope="module")
@@ -74,16 +76,44 @@ def test_a_rival_of_a_part_of_the_law_says_what_stays(demo):
 
 def test_the_diagnosis_has_the_form_of_the_contract(demo):
     diagnosis = json.loads((demo[0] / "diagnosis.json").read_text())
-    keys = {"schema", "verdict", "findings", "unexplained", "not_testable", "fit", "summary"}
-    assert set(diagnosis) == keys and diagnosis["schema"] == 1 and diagnosis["verdict"] in VERDICTS
+    keys = {"schema", "verdict", "findings", "unexplained", "not_testable", "fit", "notes", "provenance", "summary"}
+    assert set(diagnosis) == keys and diagnosis["schema"] == 2 and diagnosis["verdict"] in VERDICTS
     for finding in diagnosis["findings"]:
-        assert set(finding) == {"effect", "joints", "where", "parameters", "evidence", "alternatives"}
-        assert set(finding["evidence"]) == {"delta_bic", "probability", "heldout_gain"}
+        assert set(finding) == {"effect", "joints", "where", "parameters", "evidence", "certain", "alternatives"}
+        assert set(finding["evidence"]) == {"log_odds", "probability", "heldout_gain"}
         for parameter in finding["parameters"].values():
             assert set(parameter) == {"value", "std", "unit"} and np.isfinite(parameter["value"])
     for row in diagnosis["fit"].values():
         assert set(row) == {"rmse_nominal", "rmse_refit", "rmse_corrected", "noise_floor"}
         assert row["rmse_corrected"] <= 1.02 * row["rmse_refit"]  # never worse than refit by more than 2 %
+
+
+def test_what_is_certain_of_a_finding_holds_for_its_alternatives_too(demo):
+    truth, diagnosis = (json.loads((demo[0] / name).read_text()) for name in ("truth.json", "diagnosis.json"))
+    (hidden,), (finding,) = truth["effects"], diagnosis["findings"]
+    # While moving, Coulomb friction with an offset, and friction that differs by direction, are the same torque.
+    up, down = (hidden["parameters"][name]["value"] for name in ("coulomb_pos", "coulomb_neg"))
+    said = re.search(r"average (\S+) \+- (\S+) N m .* and (\S+) \+- (\S+) N m", finding["certain"])
+    assert said, finding["certain"]
+    forwards, _, backwards, _ = map(float, said.groups())
+    assert forwards == pytest.approx(up, rel=0.02) and backwards == pytest.approx(-down, rel=0.02)
+
+
+def test_notes_and_provenance_are_sentences_and_files(demo):
+    diagnosis = json.loads((demo[0] / "diagnosis.json").read_text())
+    assert all(note.endswith(".") for note in diagnosis["notes"]) and "5 %" in " ".join(diagnosis["notes"])
+    origin = diagnosis["provenance"]
+    assert set(origin) == {"version", "command", "robot", "recordings", "options", "date"}
+    for entry in origin["recordings"]:
+        file = demo[0] / "recordings" / entry["file"]
+        assert entry["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
+        assert entry["rows"] == len(pd.read_csv(file)) and entry["file"] in origin["command"]
+        assert entry["rate"] * entry["duration"] == pytest.approx(entry["rows"] - 1)
+
+
+def test_notes_are_shown_where_the_verdict_is(demo):
+    (note, *_) = json.loads((demo[0] / "diagnosis.json").read_text())["notes"]
+    assert " ".join(note.split()) in " ".join(demo[1].split())
 
 
 def test_the_same_recordings_get_the_same_diagnosis_to_six_digits(demo, again):

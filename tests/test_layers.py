@@ -22,6 +22,7 @@ LAYERS = (
     ("mismatch",),
     ("report",),
     ("cli",),
+    ("__main__",),
 )
 LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}
 

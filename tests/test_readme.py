@@ -7,7 +7,7 @@ import tomllib
 
 import pytest
 
-from irb140_jax import cli
+from irb140_jax.cli.parsing import parsed
 
 ROOT = pathlib.Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -44,7 +44,7 @@ def test_a_ci_with_another_test_command_would_be_noticed():
 @pytest.mark.parametrize("line", [line for line in shell_lines() if "irb140 " in line])
 def test_every_irb140_command_of_the_readme_is_understood(line):
     words = shlex.split(line.split("irb140 ", 1)[1], comments=True)
-    command = cli._parsed(words)
+    command = parsed(words)
     assert type(command).__name__.lower() == words[0]
 
 

@@ -1,12 +1,22 @@
 """Files become recordings, and what is wrong with a file is said in one line that names it."""
 
+import dataclasses
+
 import helpers_recordings as made
 import numpy as np
 import pandas as pd
 import pytest
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings import Recording, read_recording, rows_of, write_recording
+from irb140_jax.recordings import (
+    Recording,
+    read_recording,
+    recorded_joints,
+    recording_columns,
+    rows_of,
+    write_recording,
+)
+from irb140_jax.recordings.condition import choose_band, condition
 
 
 @pytest.fixture(scope="module")
@@ -292,3 +302,36 @@ def test_a_recording_is_written_to_known_formats_only(sound, tmp_path):
 def test_a_recording_with_arrays_that_do_not_fit_is_refused(sound):
     with pytest.raises(RecordingError, match=r"tau has shape \(2000, 2\)"):
         Recording(t=sound.t, q=sound.q, tau=sound.tau[:, :2], joint_names=sound.joint_names)
+
+
+def test_a_planned_motion_is_read_without_torque_where_torque_is_optional(frame, sound, robot, tmp_path):
+    path = written(frame.drop(columns=[f"tau.{joint}" for joint in sound.joint_names]), tmp_path)
+    planned = read_recording(path, robot, torque="optional")
+    np.testing.assert_allclose(planned.q, sound.q, rtol=1e-15)
+    assert not planned.has_torque and not any(c.startswith("tau.") for c in recording_columns(planned))
+    assert "missing columns tau.shoulder" in refusal(path, robot)
+
+
+def test_torque_of_some_joints_only_is_no_planned_motion(frame, robot, tmp_path):
+    path = written(frame.drop(columns="tau.elbow"), tmp_path)
+    with pytest.raises(RecordingError, match="missing column tau.elbow"):
+        read_recording(path, robot, torque="optional")
+
+
+def test_a_motion_without_torque_is_conditioned_as_with_it(sound, robot):
+    planned = dataclasses.replace(sound, tau=np.full_like(sound.tau, np.nan))
+    band = choose_band([sound], robot)
+    with_torque, without = condition(sound, band, pad=True), condition(planned, band, pad=True)
+    np.testing.assert_array_equal(without.qdd, with_torque.qdd)
+    assert np.isnan(without.tau).all()
+
+
+def test_commanded_positions_are_kept(frame, robot, tmp_path):
+    frame["qdes.elbow"] = frame["q.elbow"] + 0.01
+    again = read_recording(written(frame, tmp_path), robot)
+    np.testing.assert_allclose(again.extras["qdes.elbow"], frame["qdes.elbow"], rtol=1e-15)
+
+
+def test_the_joints_a_file_holds_are_found_in_the_models_order(frame, robot, tmp_path):
+    path = written(frame.drop(columns=["q.elbow", "tau.elbow", "qd.elbow"]), tmp_path)
+    assert recorded_joints(path, None, ("gripper", "wrist", *robot.joint_names[:2])) == ("wrist", "shoulder")

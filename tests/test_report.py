@@ -130,7 +130,7 @@ def test_a_diagnosis_without_findings_or_views_has_a_report_too(diagnosis, views
     assert not page.wrong
 
 
-@pytest.mark.parametrize("verdict", ["no_mismatch", "parameters_only", "physics_left_out", "unexplained"])
+@pytest.mark.parametrize("verdict", ["no_mismatch", "parameters_only", "physics_left_out", "unexplained", "undecided"])
 def test_every_verdict_has_its_sentence_in_the_report_and_on_the_terminal(diagnosis, views, verdict):
     title, sentence = text.VERDICTS[verdict]
     judged = diagnosis | {"verdict": verdict}

@@ -16,7 +16,9 @@ from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, explained_by, fitted, full_posterior
 from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
+from irb140_jax.mismatch.notes import notes
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, lasting, refitted, transferring
+from irb140_jax.mismatch.provenance import provenance
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
@@ -26,6 +28,7 @@ from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 
+SCHEMA = 2  # of diagnosis.json
 FEWEST_ROWS = 80  # low-passed rows below which nothing can be said
 
 
@@ -36,10 +39,20 @@ class DiagnoseConfig:
     Attributes:
         inertial_uncertainty: Relative standard deviation of the model's inertial parameters.
         effects: The library; by default every effect of the catalogue.
+        words: What the command line said beside the recordings and the uncertainty, to be kept in the diagnosis:
+            `--robot arm.xml`.
     """
 
     inertial_uncertainty: float = 0.05
     effects: tuple[AbstractEffect, ...] = tuple(CATALOGUE.values())
+    words: tuple[str, ...] = ()
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options by name, as they are kept in the diagnosis."""
+        everything = {e.slug for e in self.effects} == set(CATALOGUE)
+        effects = "all" if everything else [e.slug for e in self.effects]
+        return {"inertial_uncertainty": self.inertial_uncertainty, "effects": effects}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,9 +121,12 @@ def _diagnosed(
     model = _model(robot, ex, refit, band)
     matters = reference(ex.lib, ex.scales, band.rate)
     seen = visibility(ex, matters)
-    diagnosis = _document(robot, ex, proof, found, rest, recordings, seen)
+    usable = np.sum([r.usable[band.kept(len(r.t))].sum(axis=0) for r in smooth], axis=0)
+    said = notes(robot, smooth, band, config.inertial_uncertainty, usable, proof.judged)
+    origin = provenance(robot, recordings, config.options, config.words)
+    diagnosis = _document(robot, ex, proof, found, rest, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
-    return Result(diagnosis, model, _views(robot, ex, proof, model, recordings, smooth, diagnosis), open_)
+    return Result(diagnosis, model, _views(robot, ex, proof, recordings, said), open_)
 
 
 def _proved(ex: Explanation, progress: Callable[[str], None]) -> tuple[Refit, HeldOut, list[Unexplained]]:
@@ -134,41 +150,45 @@ def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band) -> Corrected
 
 def _document(
     robot: Robot, ex: Explanation, proof: HeldOut, found: list[dict[str, Any]], rest: list[Unexplained],
-    recordings: Sequence[Recording], seen: dict[Site, tuple[float, int]],
+    seen: dict[Site, tuple[float, int]], said: list[str], origin: dict[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
-    # Noise is what nothing predicts: less than what the findings leave, where structure without a name is left.
-    floor = proof.floor.copy()
-    for u in rest:
-        floor[u.joint] *= np.sqrt(max(1.0 - u.share, 0.0))
-    fit = {
-        name: {
-            "rmse_nominal": a, "rmse_refit": b, "rmse_corrected": c, "noise_floor": d,
-        }
-        for name, a, b, c, d in zip(
-            robot.joint_names, *(proof.rmse(x).tolist() for x in (proof.nominal, proof.refit, proof.corrected)),
-            floor.tolist(), strict=True,
-        )
-    }  # fmt: skip
+    fit = _fit(robot, proof, rest)
     inertials = inertial_views(robot, ex)
     kind = verdict(ex, proof, found, rest)
+    sources = [r["file"] for r in origin["recordings"]]
     return rounded({
-        "schema": 1,
+        "schema": SCHEMA,
         "verdict": kind,
         "findings": found,
         "unexplained": [unexplained_entry(robot, u) for u in rest],
         "not_testable": not_testable(robot, {f["effect"] for f in found}, seen),
         "fit": fit,
-        "summary": summary(kind, found, rest, fit, inertials, robot, [r.source for r in recordings]),
+        "notes": said,
+        "provenance": origin,
+        "summary": summary(kind, found, rest, fit, inertials, robot, sources),
     })  # fmt: skip
 
 
-def _views(robot, ex, proof, model, recordings, smooth, diagnosis) -> dict[str, Any]:
+def _fit(robot: Robot, proof: HeldOut, rest: list[Unexplained]) -> dict[str, dict[str, float | None]]:
+    """Errors on unseen data and the noise, by joint; none where a joint was not judged."""
+    # Noise is what nothing predicts: less than what the findings leave, where structure without a name is left.
+    floor = proof.floor.copy()
+    for u in rest:
+        floor[u.joint] *= np.sqrt(max(1.0 - u.share, 0.0))
+    columns = {
+        "rmse_nominal": proof.rmse(proof.nominal), "rmse_refit": proof.rmse(proof.refit),
+        "rmse_corrected": proof.rmse(proof.corrected), "noise_floor": floor,
+    }  # fmt: skip
+    return {
+        name: {key: float(column[j]) if proof.judged[j] else None for key, column in columns.items()}
+        for j, name in enumerate(robot.joint_names)
+    }
+
+
+def _views(
+    robot: Robot, ex: Explanation, proof: HeldOut, recordings: Sequence[Recording], said: list[str]
+) -> dict[str, Any]:
     names = [r.source for r in recordings]
-    notes = [f"{r.source}: {note}" for r in smooth for note in r.notes]
-    notes.append(
-        f"Compared below {model.band.torque:.3g} Hz; positions were smoothed below {model.band.position:.3g} Hz and "
-        "differentiated. Figures leave out rows in which the joint rests: dry friction is undetermined there."
-    )
     return rounded({
         "joints": list(robot.joint_names),
         "recordings": names,
@@ -177,7 +197,7 @@ def _views(robot, ex, proof, model, recordings, smooth, diagnosis) -> dict[str, 
         "ranking": ranking(robot, ex),
         "residual_spectrum": locate.spectra(robot, ex, proof),
         "inertials": inertial_views(robot, ex),
-        "notes": notes,
+        "notes": said,
     })  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.certain import certain
 from irb140_jax.mismatch.explanation import Explanation, full_posterior, parts
 from irb140_jax.mismatch.intervals import others, parameters_of
 from irb140_jax.mismatch.name import PREFER
@@ -39,19 +40,15 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
             "joints": [robot.joint_names[j] for j in c.joints],
             "where": c.effect.where(names, {k: v["value"] for k, v in values.items()}, units),
             "parameters": values,
-            "evidence": _evidence(ex, index),
+            "evidence": {
+                "log_odds": ex.problem.odds(others(ex, index), (index,)),
+                "probability": _probability(ex, index),
+                "heldout_gain": held_out_gain(ex, index)[0],
+            },
+            "certain": certain(robot, ex, index, w[rows], cov[rows, rows]),
             "alternatives": _alternatives(robot, ex, index),
         })  # fmt: skip
-        out[-1]["evidence"]["probability"] = _probability(ex, index)
-    return sorted(out, key=lambda f: -f["evidence"]["delta_bic"])
-
-
-def _evidence(ex: Explanation, index: int) -> dict[str, float]:
-    columns = ex.data.candidates[index].columns + ex.problem.offset
-    H = ex.problem.eliminated_near(others(ex, index), columns)
-    drop = float(H[:-1, -1] @ np.linalg.lstsq(H[:-1, :-1], H[:-1, -1], rcond=1e-12)[0])
-    share, _ = held_out_gain(ex, index)
-    return {"delta_bic": drop - len(columns) * float(np.log(ex.grams.rows.sum())), "heldout_gain": share}
+    return sorted(out, key=lambda f: -f["evidence"]["log_odds"])
 
 
 def _rivals(ex: Explanation, index: int) -> tuple[dict[Key, float], dict[Key, str]]:

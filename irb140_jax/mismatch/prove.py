@@ -32,6 +32,11 @@ class HeldOut:
     use: list[np.ndarray]
     floor: np.ndarray
 
+    @property
+    def judged(self) -> np.ndarray:
+        """Joints of which there are rows to judge by, shape (n,)."""
+        return np.any([u.any(axis=0) for u in self.use], axis=0)
+
     def rmse(self, residuals: list[np.ndarray]) -> np.ndarray:
         """RMS over the rows that count, shape (n,)."""
         squares = sum(np.sum(np.where(u, r, 0.0) ** 2, axis=0) for r, u in zip(residuals, self.use, strict=True))

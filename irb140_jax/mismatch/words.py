@@ -117,7 +117,8 @@ def summary(
     said += [i["sentence"] for i in inertials if i["sentence"] and "beyond" in i["sentence"]]
     if rest and kind != "unexplained":
         said.append(f"Something without a name is left on {_listed([robot.joint_names[u.joint] for u in rest])}.")
-    concerned = [j for f in found for j in f["joints"]] or list(fit)
+    judged = [j for j in fit if fit[j]["noise_floor"] is not None]
+    concerned = [j for f in found for j in f["joints"] if j in judged] or judged
     before = "rmse_refit" if found else "rmse_nominal"
     worst = max(concerned, key=lambda j: fit[j][before] / max(fit[j]["noise_floor"], 1e-12))
     f = fit[worst]

@@ -1,6 +1,7 @@
 """Recordings: reading, checking, conditioning, excitation, and recordings with concealed physics."""
 
 from irb140_jax.recordings.read import read_recording as read_recording
+from irb140_jax.recordings.read import recorded_joints as recorded_joints
 from irb140_jax.recordings.recording import Recording as Recording
 from irb140_jax.recordings.recording import recording_columns as recording_columns
 from irb140_jax.recordings.recording import rows_of as rows_of

@@ -94,7 +94,7 @@ def check_motion(recording: Recording, seen: Glance, robot: Robot) -> Recording:
                              "record a motion, or map the columns that hold the measured positions with --columns "
                              "FILE.toml")
     moving = seen.travel > least(MOVING)
-    for j in np.flatnonzero(moving):
+    for j in np.flatnonzero(moving & recording.has_torque):
         if np.ptp(recording.tau[:, j]) == 0:
             raise RecordingError(f"{source}: column tau.{names[j]} is {recording.tau[0, j]:g} in every row, though the "
                                  f"joint moves by {seen.travel[j]:.3g}: a dead channel; log the motor torque or "
@@ -106,7 +106,8 @@ def check_motion(recording: Recording, seen: Glance, robot: Robot) -> Recording:
     notes = [*recording.notes, *(f"Joint {names[j]} stands still: what depends on its motion can't be seen"
                                  for j in np.flatnonzero(~moving))]
     for j, name in enumerate(names):
-        notes += _clipping_note(recording.tau[:, j], name)
+        if recording.has_torque:
+            notes += _clipping_note(recording.tau[:, j], name)
         lower, upper = float(robot.lower[j]), float(robot.upper[j])
         beyond = max(np.max(recording.q[:, j]) - upper, lower - np.min(recording.q[:, j]))
         if beyond > least(LIMIT_MARGIN)[j]:

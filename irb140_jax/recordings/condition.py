@@ -158,6 +158,9 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     Returns:
         The conditioned recording, without the ends that the smoother can't fill unless `pad`.
     """
+    has_torque = recording.has_torque
+    if not has_torque:  # the motion alone: filters would spread the NaN
+        recording = dataclasses.replace(recording, tau=np.zeros_like(recording.q))
     t, q, tau, missing = _even(recording)
     raw_rate = (len(t) - 1) / (t[-1] - t[0])
     tau, spikes = _despiked(tau)
@@ -172,6 +175,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     keep = slice(None) if pad else slice(half, len(t) - half)
     grid = np.arange(t[keep][0], t[keep][-1] + 1e-9, 1.0 / band.rate)
     q, qd, qdd, tau, unsure = (_at(grid, t, x) for x in (*smoothed, tau, unsure))
+    tau = tau if has_torque else np.full_like(tau, np.nan)
     rest_speed = np.maximum(np.maximum(3.0 * speed_noise, 0.003 * np.abs(qd).max(axis=0, initial=0.0)), 1e-6)
     direction = direction_of(qd, rest_speed, band.rate)
     stuck = _at(grid, recording.t, _within_a_step(recording).astype(float))

@@ -18,7 +18,7 @@ class Glance(NamedTuple):
 
     Attributes:
         q, qd, qdd: Smoothed motion, derived from q alone, shape (SAMPLES, n).
-        tau: Smoothed torque, shape (SAMPLES, n).
+        tau: Smoothed torque, shape (SAMPLES, n); NaN where none was logged.
         logged_qd: Smoothed logged velocity, shape (SAMPLES, n), or None.
         logged_qdd: Smoothed logged acceleration, shape (SAMPLES, n), or None.
         travel: What each joint moves between extremes, shape (n,).
@@ -53,7 +53,7 @@ def glance(recording: Recording) -> Glance:
     picked = np.linspace(ends, len(grid) - 1 - ends, SAMPLES).round().astype(int)
     thin = lambda x: x[picked]  # noqa: E731
     return Glance(
-        thin(q), thin(qd), thin(qdd), thin(smooth(recording.tau)),
+        thin(q), thin(qd), thin(qdd), thin(smooth(recording.tau) if recording.has_torque else np.full_like(q, np.nan)),
         None if recording.qd is None else thin(smooth(recording.qd)),
         None if recording.qdd is None else thin(smooth(recording.qdd)), np.ptp(q, axis=0),
     )

@@ -1,7 +1,9 @@
 """A file to a checked `Recording`: the way in for everything a user measured."""
 
 import dataclasses
+import hashlib
 import pathlib
+from typing import Literal
 
 import numpy as np
 
@@ -16,13 +18,17 @@ from irb140_jax.recordings.table import read_table
 from irb140_jax.robot import Robot
 
 
-def read_recording(path: str | pathlib.Path, robot: Robot, columns: str | pathlib.Path | None = None) -> Recording:
+def read_recording(
+    path: str | pathlib.Path, robot: Robot, columns: str | pathlib.Path | None = None, *,
+    torque: Literal["required", "optional"] = "required",
+) -> Recording:
     """Read a recording of this robot from CSV, Parquet or NPZ and check it.
 
     Args:
         path: The file; its columns are t, q.<joint>, tau.<joint> and where logged qd.<joint>, qdd.<joint>, SI units.
         robot: The model of the robot that was recorded; gives the joints' names and what torque is plausible.
         columns: A TOML file that maps other names and units, see `recordings.columns`.
+        torque: Whether columns tau.<joint> have to be there; a planned motion has none, and its `tau` is NaN.
 
     Returns:
         The recording.  Repairs that are safe are made and stated in its `notes`.
@@ -31,24 +37,28 @@ def read_recording(path: str | pathlib.Path, robot: Robot, columns: str | pathli
         RecordingError: It can't be used; the message says file, column, row (counted from 1 below the header), what is
             wrong and what would mend it.
     """
-    recording = unchecked_recording(pathlib.Path(path), robot.joint_names, columns)
+    path = pathlib.Path(path)
+    recording = unchecked_recording(path, robot.joint_names, columns, torque=torque)
     recording = repair.without_glitches(repair.unwrapped(recording, robot.is_slide))
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
-    check_against_model(recording, seen, robot)
-    return dataclasses.replace(recording, source=pathlib.Path(path).name)
+    if recording.has_torque:
+        check_against_model(recording, seen, robot)
+    return dataclasses.replace(recording, source=path.name, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 def unchecked_recording(
-    path: pathlib.Path, joint_names: tuple[str, ...], columns: str | pathlib.Path | None = None
+    path: pathlib.Path, joint_names: tuple[str, ...], columns: str | pathlib.Path | None = None, *,
+    torque: Literal["required", "optional"] = "required",
 ) -> Recording:
-    """The numbers of a file as a `Recording`: complete, finite, in rising time, but its motion and torque not "
-      "checked."""
+    """The numbers of a file as a `Recording`: complete, finite, in rising time; motion and torque are not checked."""
     column_map = ColumnMap() if columns is None else read_column_map(columns, joint_names)
     table, notes = read_table(path, joint_names)
     table = renamed(table, column_map)
+    # All of the torques or none: some of them missing is more likely a wrong name than a planned motion.
+    has_torque = torque == "required" or any(f"tau.{joint}" in table for joint in joint_names)
     wanted = [*([] if column_map.rate and "t" not in table else ["t"]),
-              *(f"{kind}.{joint}" for kind in ("q", "tau") for joint in joint_names)]
+              *(f"{kind}.{joint}" for kind in (("q", "tau") if has_torque else ("q",)) for joint in joint_names)]
     _require(table, wanted, path)
     optional = {kind: [f"{kind}.{joint}" for joint in joint_names] for kind in ("qd", "qdd")}
     complete = {kind: names for kind, names in optional.items() if all(name in table for name in names)}
@@ -78,11 +88,35 @@ def unchecked_recording(
     kept = {"t", *wanted, *(name for names in complete.values() for name in names)}
     return Recording(
         t=table["t"], joint_names=joint_names, source=str(path), notes=tuple(notes),
-        q=stacked([f"q.{joint}" for joint in joint_names]), tau=stacked([f"tau.{joint}" for joint in joint_names]),
-        **{kind: stacked(names) for kind, names in complete.items()},
+        q=stacked([f"q.{joint}" for joint in joint_names]),
+        tau=(stacked([f"tau.{joint}" for joint in joint_names]) if has_torque
+             else np.full((len(table["t"]), len(joint_names)), np.nan)),
+        **{kind: stacked(names) for kind, names in complete.items()},  # pyright: ignore[reportArgumentType]
         extras={name: values for name, values in table.items() if name not in kept},
         file_t=file_t if len(file_t) > len(table["t"]) else None,
     )
+
+
+def recorded_joints(
+    path: str | pathlib.Path, columns: str | pathlib.Path | None, known_joint_names: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Those of the known joints which a file holds, in the order in which they are known.
+
+    A joint is held by a file that has its position and, if it has any torque at all, its torque.
+
+    Args:
+        path: The recording.
+        columns: The TOML file that maps its columns, or None.
+        known_joint_names: Every joint that the model has.
+
+    Raises:
+        RecordingError: The file or the map can't be read.
+    """
+    column_map = ColumnMap() if columns is None else read_column_map(columns, known_joint_names)
+    table = renamed(read_table(pathlib.Path(path), known_joint_names)[0], column_map)
+    moved = [joint for joint in known_joint_names if f"q.{joint}" in table]
+    driven = [joint for joint in moved if f"tau.{joint}" in table]
+    return tuple(driven or moved)
 
 
 def _require(table: dict[str, np.ndarray], wanted: list[str], path: pathlib.Path) -> None:

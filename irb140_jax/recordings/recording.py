@@ -1,6 +1,7 @@
 """What a robot's log holds, and how it is written down."""
 
 import dataclasses
+import hashlib
 import os
 import pathlib
 
@@ -20,7 +21,7 @@ class Recording:
     Attributes:
         t: Time [s], shape (T,), strictly rising; the rate may jitter.
         q: Joint positions [rad or m], shape (T, n).
-        tau: Logged joint torques [N m or N], shape (T, n).
+        tau: Logged joint torques [N m or N], shape (T, n); all NaN where none was logged, as in a planned motion.
         joint_names: Names of the joints, in the order of the columns.
         qd: Logged joint velocities [rad/s or m/s], shape (T, n); None where they were not logged for every joint.
         qdd: Logged joint accelerations [rad/s^2 or m/s^2], shape (T, n); None likewise.
@@ -28,6 +29,7 @@ class Recording:
         source: File name, for messages.
         notes: Repairs made and oddities seen, one plain sentence each.
         file_t: Time of every row of the file, those that reading left out included [s]; None where it left out none.
+        sha256: Of the file it was read from; empty where it comes from none.
     """
 
     t: Float[np.ndarray, " T"]
@@ -40,6 +42,7 @@ class Recording:
     source: str = "recording"
     notes: tuple[str, ...] = ()
     file_t: Float[np.ndarray, " rows"] | None = None
+    sha256: str = ""
 
     def __post_init__(self) -> None:
         shape = (len(self.t), len(self.joint_names))
@@ -49,6 +52,11 @@ class Recording:
                 raise RecordingError(f"{self.source}: {name} has shape {value.shape}; allowed is (T, n) = {shape}, one "
                                      "row a sample and one column a joint")
 
+    @property
+    def has_torque(self) -> bool:
+        """Whether torque was logged; a planned motion has none."""
+        return not np.isnan(self.tau).all()
+
 
 def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Recording:
     """The samples `rows` of a recording, under the same name unless `source` gives another."""
@@ -56,8 +64,16 @@ def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Rec
     return dataclasses.replace(
         recording, t=recording.t[rows], q=recording.q[rows], tau=recording.tau[rows], qd=cut(recording.qd),
         qdd=cut(recording.qdd), extras={k: v[rows] for k, v in recording.extras.items()},
-        source=recording.source if source is None else source, file_t=None,
+        source=recording.source if source is None else source, file_t=None, sha256="",
     )
+
+
+def content_hash(recording: Recording) -> str:
+    """SHA-256 of time, positions and torque: the same for the same log, whatever its file is called or written as."""
+    digest = hashlib.sha256(" ".join(recording.joint_names).encode())
+    for numbers in (recording.t - recording.t[0], recording.q, recording.tau):
+        digest.update(np.ascontiguousarray(numbers, dtype="<f8").tobytes())
+    return digest.hexdigest()
 
 
 def recording_columns(recording: Recording) -> dict[str, Float[np.ndarray, " T"]]:
@@ -66,7 +82,7 @@ def recording_columns(recording: Recording) -> dict[str, Float[np.ndarray, " T"]
     columns = {"t": recording.t}
     for name in ("q", "qd", "qdd", "tau"):
         value = getattr(recording, name)
-        if value is not None:
+        if value is not None and (name != "tau" or recording.has_torque):
             columns |= {f"{name}.{joint}": value[:, i] for i, joint in enumerate(recording.joint_names)}
     return columns | recording.extras
 

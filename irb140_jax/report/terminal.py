@@ -15,6 +15,7 @@ VERDICT_COLOURS = {
     "no_mismatch": "green",
     "parameters_only": "green",
     "physics_left_out": "dark_orange",
+    "undecided": "yellow",
     "unexplained": "red",
 }
 
@@ -36,6 +37,10 @@ def print_diagnosis(diagnosis: Mapping, views: Mapping, console: Console) -> Non
     if diagnosis["not_testable"]:
         names = dict.fromkeys(text.words(blind["effect"]) for blind in diagnosis["not_testable"])
         console.print(f"Not testable with this motion, on some joints or all: {', '.join(names)}.")
+    if diagnosis["notes"]:
+        console.print("Notes:")
+    for note in diagnosis["notes"]:
+        console.print(Padding(escape(note), (0, 0, 0, 2)))
 
 
 def print_reveal(reveal: Reveal, console: Console) -> None:
@@ -73,6 +78,7 @@ def _where(findings: Sequence[Mapping]) -> Iterator[str]:
     """Where each finding acts, and what else it may be."""
     for finding in findings:
         yield f"[bold]{text.words(finding['effect']).capitalize()}[/]: {escape(finding['where'])}"
+        yield f"  Certain: {escape(finding['certain'])}"
         for other in finding["alternatives"]:
             name, share = text.words(other["effect"]), text.percent(other["probability"])
             yield f"  It may also be {name} ({share}). To separate them: {escape(other['separate_by'])}"

@@ -7,6 +7,7 @@ VERDICTS = {
     "no_mismatch": ("No mismatch", "The model as given explains these recordings down to the noise."),
     "parameters_only": ("Wrong parameters only", "With refitted masses, centres and inertias nothing is left out."),
     "physics_left_out": ("Physics left out", "The robot does something that the model does not hold."),
+    "undecided": ("Undecided", "These recordings can't tell whether the model leaves anything out."),
     "unexplained": ("Unexplained", "Structure is left in the torque which no effect of the library explains."),
 }
 

@@ -1,0 +1,54 @@
+"""irb140 excite."""
+
+import dataclasses
+from typing import Annotated
+
+from tyro.conf import arg
+
+from irb140_jax.cli.options import Folder, OutFile
+from irb140_jax.cli.shown import progress, tell_kept
+from irb140_jax.errors import InputError
+
+
+@dataclasses.dataclass(frozen=True)
+class Excite:
+    """Write the motion that separates what is undecided."""
+
+    folder: Folder
+    """Folder of a diagnosis."""
+
+    out: OutFile
+    """CSV file with t, q.<joint>, qd.<joint>, qdd.<joint>: the motion to play, from rest to rest."""
+
+    duration: Annotated[float, arg(metavar="SECONDS")] = 40.0
+    """About how long the motion may last."""
+
+    rate: Annotated[float, arg(metavar="HZ")] = 250.0
+    """Rows per second."""
+
+    seed: int = 0
+    """Of the search; the same seed gives the same motion."""
+
+    def run(self) -> None:
+        if self.seed < 0:
+            raise InputError(f"--seed {self.seed}: it has to be 0 or larger")
+        from irb140_jax.report import is_our_table, results_file, write_table
+
+        ours = lambda path: is_our_table(path, ("q.", "qd.", "qdd."))  # noqa: E731
+        with results_file(self.out, ours) as results:
+            table, sentences = self._motion()
+            results.write(lambda folder: write_table(table, folder / results.name))
+            tell_kept(results)
+        print(*sentences, sep="\n")
+        print(f"{self.out}: {len(table['t'])} rows, {self.rate:g} a second")
+
+    def _motion(self) -> tuple[dict, list[str]]:
+        """The motion as columns, and what it decides."""
+        from irb140_jax.mismatch import load_model, load_undecided, propose
+        from irb140_jax.recordings.excite import motion_columns
+        from irb140_jax.report import proposal_sentences
+
+        robot, open_ = load_model(self.folder).robot, load_undecided(self.folder)
+        with progress() as tell:
+            proposal = propose(robot, open_, seed=self.seed, duration=self.duration, rate=self.rate, progress=tell)
+        return motion_columns(proposal.motion, robot.joint_names), proposal_sentences(robot, open_, proposal)
