@@ -3,7 +3,9 @@
 import numpy as np
 
 
-def tree_xml(parents: tuple[int, ...], seed: int, kinds: str = "", extra: str = "", inside: dict[int, str] | None = None):
+def tree_xml(
+    parents: tuple[int, ...], seed: int, kinds: str = "", extra: str = "", inside: dict[int, str] | None = None
+) -> str:
     """MJCF of a tree on a fixed, tilted base: any axes, inertials and reference positions, drives, springs.
 
     Args:

@@ -280,14 +280,14 @@ TENDON = '<tendon><fixed name="t" stiffness="1"><joint joint="a" coef="1"/><join
         ({"actuators": '<motor name="m" joint="a" damping="1 0.5"/>'}, "actuator 'm' has polynomial damping"),
         ({"actuators": '<motor name="m" joint="a"/><motor joint="a" gear="2"/>'}, "joint 'a' has two actuators"),
         ({"actuators": '<muscle name="m" joint="a" lengthrange="-1 1"/>'}, "actuator 'm' is a muscle"),
-        ({"actuators": '<motor name="m" site="s"/>', "inside": '<site name="s"/>'}, "actuator 'm' drives no joint but the arm"),
+        ({"actuators": '<motor name="m" site="s"/>', "inside": '<site name="s"/>'}, "'m' drives no joint but the arm"),
         ({"extra": '<custom><numeric name="velocity_limit" data="2"/></custom>'}, "one for each of the 2 joints"),
         ({"extra": '<custom><numeric name="velocity_limit" data="2 0"/></custom>'}, "allowed: positive numbers"),
         ({"first": 'name="a" armature="-1"'}, "joint 'a' has armature -1; allowed: 0 or more"),
         ({"second": 'name="b" frictionloss="-0.1"'}, "joint 'b' has frictionloss -0.1"),
         ({"first": 'name="a" damping="nan"'}, "damping is .*nan"),
         ({"first": 'name="b"'}, "MuJoCo can't compile this model: .*repeated name 'b'"),
-        ({"extra": GONE, "inside": '<body name="c"><geom type="mesh" mesh="gone"/></body>'}, "body 'c' .*mesh.*gone.stl"),
+        ({"extra": GONE, "inside": '<body name="c"><geom type="mesh" mesh="gone"/></body>'}, "'c' .*mesh.*gone.stl"),
     ],
 )
 def test_what_a_robot_can_not_represent_is_refused_by_name(tmp_path, parts, says):

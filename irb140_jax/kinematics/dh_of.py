@@ -43,7 +43,8 @@ def dh_of(robot: Robot) -> DHView:
     """
     if not robot.is_chain:
         raise RobotError(
-            f"robot '{robot.name}' branches; a Denavit-Hartenberg table is of a chain: load it with the joints of one arm"
+            f"robot '{robot.name}' branches; a Denavit-Hartenberg table is of a chain: load it with the joints of one "
+            "arm"
         )
     axes, points, T_tool = _lines(robot)
     z = axes[0]

@@ -117,9 +117,9 @@ def _left_out(
 
 def _refuse_number(count: int, model: mujoco.MjModel, left_out: dict[int, str], wish: Wish, source: str) -> None:
     if count == 0:
-        why = f": {_joint(model, next(iter(left_out)))}: {next(iter(left_out.values()))}" if left_out else ""
-        raise RobotError(f"{source}: no joint is left to diagnose, of {model.njnt} in the model{why}: give a model with "
-                         "a joint that can be recorded")
+        why = next((f": {_joint(model, j)}: {reason}" for j, reason in left_out.items()), "")
+        raise RobotError(f"{source}: no joint is left to diagnose, of {model.njnt} in the model{why}: give a model "
+                         "with a joint that can be recorded")
     if count > MOST_JOINTS:
         named = "are named" if wish.joints is not None else "can be recorded"
         raise RobotError(f"{source}: {count} joints {named}, 1 to {MOST_JOINTS} are allowed at once: name those of an "

@@ -46,9 +46,9 @@ def _mimics(model: mujoco.MjModel, mimics: tuple[tuple[str, str, float, float], 
 
 
 def _equalities(model: mujoco.MjModel) -> Iterator[Coupling]:
-    for e in np.flatnonzero(model.eq_active0):
+    for e in map(int, np.flatnonzero(model.eq_active0)):
         kind, first, second = int(model.eq_type[e]), int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
-        given = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_EQUALITY, int(e))
+        given = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_EQUALITY, e)
         name = f"equality constraint '{given}'" if given else "an equality constraint"
         if kind == int(EQ.mjEQ_JOINT):
             follows = lambda qpos, e=e, at=second: _polynomial(model, e, at, qpos)  # noqa: E731

@@ -111,6 +111,6 @@ def _mended(body: mujoco.MjsBody) -> str | None:
     else:
         body.fullinertia = mended[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return (
-        f"body '{body.name}' has principal moments of inertia {described(inertia)}, of which the largest exceeds the sum "
-        f"of the others; no body has that: it counts with {described(mended)}"
+        f"body '{body.name}' has principal moments of inertia {described(inertia)}, of which the largest exceeds "
+        f"the sum of the others; no body has that: it counts with {described(mended)}"
     )

@@ -113,7 +113,8 @@ def _body_inertial(
     """Mass, centre and inertia about it of one body, in the axes of the link that carries it."""
     to_link = tree.frame[link].T
     body_R, raw = tree.data.xmat[body].reshape(3, 3), given.get(model.body(body).name)
-    centre = to_link @ (tree.data.xpos[body] + body_R @ (model.body_ipos[body] if raw is None else raw.com) - tree.origin[link])
+    com = model.body_ipos[body] if raw is None else raw.com
+    centre = to_link @ (tree.data.xpos[body] + body_R @ com - tree.origin[link])
     if raw is not None:
         A = to_link @ body_R
         return Inertial(raw.mass, centre, A @ raw.inertia @ A.T)
@@ -133,7 +134,7 @@ def _mended(
     if is_negative(mass, whole) or min(given[b].mass for b in broken) < 0.0:
         raise RobotError(f"{source}: {what}; none may be negative: mend its <inertial>")
     if not is_lopsided(whole):
-        return possible(whole), f"{what}, which no body has{more}; with all that is fixed to it, it makes a possible one"
+        return possible(whole), f"{what}{more}, which no body has; with all that is fixed to it, it is a possible one"
     mended = possible(whole)
     return mended, (
         f"{what}, of which the largest exceeds the sum of the others{more}; no body has that: with all that is fixed "

@@ -21,7 +21,6 @@ from irb140_jax.robot.refuse import refuse_impossible_numbers, refuse_unsupporte
 from irb140_jax.robot.robot import Robot
 from irb140_jax.robot.urdf import prepared_urdf
 
-
 Compiled = TypeVar("Compiled")
 
 

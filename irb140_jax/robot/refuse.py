@@ -1,4 +1,4 @@
-"""What a `Robot` can't represent is refused where it touches the joints chosen, by name and with what to do about it."""
+"""What a `Robot` can't represent is refused where it touches the joints chosen: by name, with what to do about it."""
 
 from collections.abc import Iterator, Mapping
 
@@ -53,7 +53,7 @@ def _forces(model: mujoco.MjModel, choice: Choice) -> Iterator[str]:
     for body in np.flatnonzero(model.body_gravcomp):
         if choice.carrier[body] >= 0:
             name = model.body(body).name
-            yield f"body '{name}' has gravcomp, which no joint spring represents: remove it, or model the counterbalance"
+            yield f"body '{name}' has gravcomp, which no joint spring is: remove it, or model the counterbalance"
     if model.opt.density or model.opt.viscosity or np.any(model.opt.wind):
         yield "<option> has a fluid (density, viscosity or wind), which is not part of this model: set them to 0"
     polynomials = (

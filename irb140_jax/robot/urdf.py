@@ -127,8 +127,9 @@ def _broken(link: ET.Element, source: str) -> Inertial | None:
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if not is_negative(mass, inertia) and not is_lopsided(inertia):
         return None
-    placed = lambda key: ["0 0 0"] if (x := link.find("inertial/origin")) is None else [x.get(key, "0 0 0")]  # noqa: E731
-    com, rpy = (_triple(placed(key)[0], link, source) for key in ("xyz", "rpy"))
+    origin = link.find("inertial/origin")
+    placed = {} if origin is None else origin.attrib
+    com, rpy = (_triple(placed.get(key, "0 0 0"), link, source) for key in ("xyz", "rpy"))
     R = Rotation.from_euler("xyz", rpy).as_matrix()
     return Inertial(mass, com, R @ inertia @ R.T)
 
@@ -138,7 +139,8 @@ def _triple(text: str, link: ET.Element, source: str) -> np.ndarray:
         x, y, z = (float(word) for word in text.split())
         return np.array([x, y, z])
     except ValueError as error:
-        raise RobotError(f"{source}: link '{link.get('name')}': '{text}' in its <inertial>: give three numbers") from error
+        name = link.get("name")
+        raise RobotError(f"{source}: link '{name}': '{text}' in its <inertial>: give three numbers") from error
 
 
 def _floating(robot: ET.Element) -> frozenset[str]:
@@ -149,7 +151,8 @@ def _floating(robot: ET.Element) -> frozenset[str]:
 
 
 def _mimics(robot: ET.Element, source: str) -> Iterator[tuple[str, str, float, float]]:
-    moving = {joint.get("name", "") for joint in robot.findall("joint") if joint.get("type") not in ("fixed", *FLOATING)}
+    still = ("fixed", *FLOATING)
+    moving = {joint.get("name", "") for joint in robot.findall("joint") if joint.get("type") not in still}
     for joint in robot.findall("joint"):
         mimic, name = joint.find("mimic"), joint.get("name", "")
         if mimic is None or name not in moving:
