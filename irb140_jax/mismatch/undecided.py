@@ -226,9 +226,10 @@ def from_arrays(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Undecide
     return Undecided(
         columns=tuple(Column(**{k: _tuples(v) for k, v in c.items()}) for c in meta["columns"]),
         pairs=tuple(Pair(**{k: _tuples(v) for k, v in p.items()}) for p in meta["pairs"]),
-        **{k: _tuples(meta[k]) for k in ("chosen", "loose", "hidden")}, uncertainty=meta["uncertainty"],
-        band=Band(**meta["band"]), scales=Scales(duration=meta["duration"], **sizes),
-        **{k: v for k, v in arrays.items() if k not in sizes},  # pyright: ignore[reportArgumentType]
+        chosen=_tuples(meta["chosen"]), loose=_tuples(meta["loose"]), hidden=_tuples(meta["hidden"]),
+        gram=arrays["gram"], scale=arrays["scale"], reference=arrays["reference"], uncertainty=meta["uncertainty"],
+        ar=arrays["ar"], level=arrays["level"], band=Band(**meta["band"]),
+        scales=Scales(duration=meta["duration"], **sizes),
     )  # fmt: skip
 
 
