@@ -102,7 +102,8 @@ def diagnose(
 def _diagnosed(
     robot: Robot, recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None]
 ) -> Result:
-    recordings = [with_lost_torque_marked(_finite(r), np.where(robot.is_slide, MOVING[1], MOVING[0])) for r in recordings]
+    moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
+    recordings = [with_lost_torque_marked(_finite(r), moves) for r in recordings]
     progress("smoothing and differentiating the positions")
     band = choose_band(list(recordings), robot)
     smooth = conditioned(recordings, band)

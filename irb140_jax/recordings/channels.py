@@ -28,7 +28,8 @@ CHANGED = 0.05  # of the share by which a joint is concerned by a hypothesis
 ZERO_STEP = 0.4  # rad between zeros tried; the nearest is 0.2 rad off, which leaves 2 % of gravity
 LATEST = 0.4  # s by which a torque may come late
 ALIKE = 1.5  # largest over smallest of factors that are one
-FAR_OFF = 5.0  # times too large or too small, on most joints alike, that no wrong mass explains; not alike, 4 times that
+ORDER = "put the columns in order, or exchange them with --columns FILE.toml"
+FAR_OFF = 5.0  # times too large or too small, on most joints alike, that no wrong mass explains; 4 times that if not alike
 
 
 class Doubt(NamedTuple):
@@ -71,8 +72,8 @@ def with_lost_torque_marked(recording: Recording, least_travel: np.ndarray) -> R
         lost[rows, j] = True
         value, i = recording.tau[rows, j][0], np.flatnonzero(rows)
         if rows.all():
-            notes.append(f"tau.{name} is {value:.4g} in every row though the joint moves: a dead channel. {name} is not "
-                         "judged; the other joints are. Log its torque or current, or map the column that holds it")
+            notes.append(f"tau.{name} is {value:.4g} in every row though the joint moves: a dead channel. {name} is "
+                         "not judged; the others are. Log its torque or current, or map the column that holds it")
         else:
             when = f"from {recording.t[i[0]]:.4g} s to {recording.t[i[-1]]:.4g} s"
             notes.append(f"tau.{name} is frozen at {value:.4g} {when} though the joint moves: these rows of {name} are "
@@ -192,14 +193,13 @@ def _hypotheses(
         pair = f"{names[a]} and {names[b]}"
         yield 1.0, Doubt(
             "exchanged torque", (a, b), f"torque columns look exchanged: tau.{names[b]} fits joint {names[a]}, "
-            f"tau.{names[a]} fits joint {names[b]}", "put the columns in order, or exchange them with --columns FILE.toml",
-            {},
+            f"tau.{names[a]} fits joint {names[b]}", ORDER, {},
         ), explained(seen, model, judged & judged[order], seen.tau[:, order])  # fmt: skip
         if robot.is_slide[a] == robot.is_slide[b]:
             turned = seen._replace(q=seen.q[:, order], qd=seen.qd[:, order], qdd=seen.qdd[:, order])
             yield 1.5, Doubt(
                 "exchanged positions", (a, b), f"position columns of {pair} look exchanged: the other way round the "
-                "model explains the torque", "put the columns in order, or exchange them with --columns FILE.toml", {},
+                "model explains the torque", ORDER, {},
             ), explained(turned, again(turned.q, turned.qd, turned.qdd), judged)  # fmt: skip
     # Of a joint alone, gravity turned round is a mass on the other side, and its zero is where that mass hangs.
     if judged.sum() > 1:
@@ -227,7 +227,7 @@ def _zeros(
     best = max(fine, key=lambda z: float(np.nansum(fine[z])))
     name = recording.joint_names[j]
     yield 1.5, Doubt(
-        "zero", (j,), f"the zero of q.{name} looks {best:+.2g} rad off: moved by so much, the model explains the torque",
+        "zero", (j,), f"the zero of q.{name} looks {best:+.2g} rad off: moved so far, the model explains the torque",
         f"map it with --columns and [offset] \"q.{name}\" = {best:.3g}, or mend the joint's reference in the model", {},
     ), fine[best]  # fmt: skip
 
@@ -244,7 +244,8 @@ def lateness(recording: Recording, seen: Glance, model: Torques, j: int) -> floa
     step = (recording.t[-1] - recording.t[0]) / len(seen.tau)
     features = _features(seen.qd[:, j], model.total[:, j])
     turned = _share(features, -seen.tau[:, j])
-    best = 1.0 - min(1.0 - WELL, (1.0 - turned) / 2.0), 0  # a slow wave turned round is nearly the wave half a period late
+    # A slow wave turned round is nearly the wave half a period late.
+    best = 1.0 - min(1.0 - WELL, (1.0 - turned) / 2.0), 0
     for k in range(1, int(LATEST / step) + 1):
         share = _share(features[:-k], seen.tau[k:, j])
         best = max(best, (share, k))
@@ -270,18 +271,22 @@ def unit_doubts(recording: Recording, seen: Glance, model: Torques, judged: np.n
     worst = int(np.argmax(np.abs(np.log(sizes))))
     factors = {f"tau.{name}": float(f"{1.0 / s:.3g}") for name, s in zip(names, sizes, strict=True)}
     listed = ", ".join(f"\"{k}\" = {v:g}" for k, v in factors.items())
-    guess = "percent of the rated torque or milliampere" if middle > 1.0 else "motor side, ampere or a share of the rated"
+    guess = "percent of the rated torque or mA" if middle > 1.0 else "motor side, ampere or a share of the rated"
     if alike and 800.0 < middle < 1250.0:
         guess = "mN m"
-    said = (f"column tau.{names[worst]} has the shape of the model's torque but is {sizes[worst]:.3g} times as large, and "
-            f"so with the other joints: this looks like {guess}; N m on the joint side are wanted")  # fmt: skip
-    remedy = ("multiply motor torque by the gear ratio, current by the torque constant too, percent by a hundredth of the "
-              f"rated torque, with --columns and [scale]; near the model's torque would be {listed}")  # fmt: skip
+    said = (
+        f"column tau.{names[worst]} has the shape of the model's torque but is {sizes[worst]:.3g} times as large, and so "
+        f"with the other joints: this looks like {guess}; N m on the joint side are wanted"
+    )
+    remedy = (
+        "multiply motor torque by the gear ratio, current by the torque constant too, percent by a hundredth of the rated "
+        f"torque, with --columns and [scale]; near the model's torque would be {listed}"
+    )
     return [Doubt("unit", tuple(ratio), said, remedy, factors)]
 
 
 def _ratio(seen: Glance, model: Torques, j: int) -> float:
-    """How many times the model's torque the logged one is, friction taken off; 0 where the two have little in common."""
+    """How many times the model's torque the logged one is, without friction; 0 where they have little in common."""
     features = _features(seen.qd[:, j], model.total[:, j])
     centred, target = features - features.mean(axis=0), seen.tau[:, j] - seen.tau[:, j].mean()
     size = np.linalg.norm(centred, axis=0)

@@ -100,8 +100,9 @@ def check_motion(recording: Recording, seen: Glance, robot: Robot) -> Recording:
         lost = recording.torque_lost
         if lost is not None and np.all(lost.all(axis=0) | ~moving):
             raise RecordingError(f"{source}: no moving joint has a torque that changes: columns "
-                                 f"{', '.join('tau.' + names[j] for j in np.flatnonzero(moving))} are dead channels; log "
-                                 "motor torques or currents, or map the columns that hold them with --columns FILE.toml")
+                                 f"{', '.join('tau.' + names[j] for j in np.flatnonzero(moving))} are dead channels; "
+                                 "log motor torques or currents, or map the columns that hold them with --columns "
+                                 "FILE.toml")
     if seen.logged_qd is not None:
         _check_derivative(recording, seen.qd, seen.logged_qd, moving, ("qd", "q"))
     if seen.logged_qdd is not None:

@@ -44,8 +44,8 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Rec
     _check_sign(recording, seen, model, driven & on_time)
     for doubt in channel_doubts(recording, seen, robot, on_time, driven):
         raise RecordingError(f"{recording.source}: {doubt.said}: {doubt.remedy}")
-    said = [f"tau.{recording.joint_names[j]} comes about {1000 * delay:.0f} ms after what the model needs: a drive that "
-            "lags, or channels out of step" for j, delay in late.items() if delay > 0.0]  # fmt: skip
+    said = [f"tau.{recording.joint_names[j]} comes about {1000 * delay:.0f} ms after what the model needs: a drive "
+            "that lags, or channels out of step" for j, delay in late.items() if delay > 0.0]  # fmt: skip
     return dataclasses.replace(recording, notes=(*recording.notes, *said))
 
 

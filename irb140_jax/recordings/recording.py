@@ -66,7 +66,8 @@ def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Rec
     return dataclasses.replace(
         recording, t=recording.t[rows], q=recording.q[rows], tau=recording.tau[rows], qd=cut(recording.qd),
         qdd=cut(recording.qdd), extras={k: v[rows] for k, v in recording.extras.items()},
-        source=recording.source if source is None else source, file_t=None, sha256="", torque_lost=cut(recording.torque_lost),
+        source=recording.source if source is None else source, file_t=None, sha256="",
+        torque_lost=cut(recording.torque_lost),
     )
 
 
