@@ -29,7 +29,7 @@ ZERO_STEP = 0.4  # rad between zeros tried; the nearest is 0.2 rad off, which le
 LATEST = 0.4  # s by which a torque may come late
 ALIKE = 1.5  # largest over smallest of factors that are one
 ORDER = "put the columns in order, or exchange them with --columns FILE.toml"
-FAR_OFF = 5.0  # times too large or too small, on most joints alike, that no wrong mass explains; 4 times that if not alike
+FAR_OFF = 5.0  # times too large or small, alike on most joints, that no wrong mass explains; 4 times that if not alike
 
 
 class Doubt(NamedTuple):
@@ -275,12 +275,12 @@ def unit_doubts(recording: Recording, seen: Glance, model: Torques, judged: np.n
     if alike and 800.0 < middle < 1250.0:
         guess = "mN m"
     said = (
-        f"column tau.{names[worst]} has the shape of the model's torque but is {sizes[worst]:.3g} times as large, and so "
-        f"with the other joints: this looks like {guess}; N m on the joint side are wanted"
+        f"column tau.{names[worst]} has the shape of the model's torque but is {sizes[worst]:.3g} times as large, and "
+        f"so with the other joints: this looks like {guess}; N m on the joint side are wanted"
     )
     remedy = (
-        "multiply motor torque by the gear ratio, current by the torque constant too, percent by a hundredth of the rated "
-        f"torque, with --columns and [scale]; near the model's torque would be {listed}"
+        "multiply motor torque by the gear ratio, current by the torque constant too, percent by a hundredth of the "
+        f"rated torque, with --columns and [scale]; near the model's torque would be {listed}"
     )
     return [Doubt("unit", tuple(ratio), said, remedy, factors)]
 
