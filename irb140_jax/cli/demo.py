@@ -69,6 +69,6 @@ def _write_demo(out: pathlib.Path, made: Callable[[pathlib.Path], "Result"], tru
         result = made(folder)
         save(result, folder)
         reveal = revealed(truth["effects"], result.diagnosis, seal)
-        (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal), encoding="utf-8")
+        (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal, out), encoding="utf-8")
         (folder / "truth.json").write_text(json.dumps(truth | {"seal": seal}, indent=1) + "\n", encoding="utf-8")
     return result

@@ -80,7 +80,7 @@ def _write(result: "Result", out: pathlib.Path) -> None:
 
     with whole_folder(out) as folder:
         save(result, folder)
-        (folder / "report.html").write_text(html_report(result.diagnosis, result.views), encoding="utf-8")
+        (folder / "report.html").write_text(html_report(result.diagnosis, result.views, folder=out), encoding="utf-8")
 
 
 def show(result: "Result", out: pathlib.Path) -> None:
