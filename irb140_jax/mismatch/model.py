@@ -212,7 +212,7 @@ def to_json(model: CorrectedModel) -> dict[str, Any]:
         "schema": 1,
         "robot": {
             "leaves": _finite(leaves), "joint_names": static.joint_names, "is_slide": static.is_slide,
-            "name": static.name,
+            "name": static.name, "parent": static.parent,
         },
         "phi_refit": model.phi_refit.tolist(),
         "phi_corrected": model.phi_corrected.tolist(),
@@ -236,7 +236,8 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
     return CorrectedModel(
         Robot(
             **leaves,  # pyright: ignore[reportArgumentType]: arrays only, static fields are named below
- joint_names=tuple(robot["joint_names"]), is_slide=tuple(robot["is_slide"]), name=robot["name"]
+ joint_names=tuple(robot["joint_names"]), is_slide=tuple(robot["is_slide"]), name=robot["name"],
+            parent=tuple(robot.get("parent", ())),
         ),
         np.array(data["phi_refit"]),
         np.array(data["phi_corrected"]),
