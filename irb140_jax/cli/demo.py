@@ -68,7 +68,8 @@ def _from_files(case: "ConcealedCase", desk: pathlib.Path) -> "Result":
 
 
 def _write(
-    result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path, out: pathlib.Path
+    result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path,
+    out: pathlib.Path,
 ) -> None:  # fmt: skip
     """Recordings, diagnosis, report and truth into an empty folder, which will be `out`."""
     from irb140_jax.mismatch import save
