@@ -34,8 +34,8 @@ def html_report(
         reveal: What was hidden, where that is known (a demonstration).
         folder: Where diagnosis.json lies, for the commands that the report proposes.
     """
-    empty: dict = {name: [] for name in ("recordings", "ranking", "inertials", "motions")}
-    views = {**empty, "maps": {}, "residual_spectrum": {}, **views}
+    empty: dict[str, Any] = {name: [] for name in ("recordings", "ranking", "inertials", "motions")}
+    views = empty | {"maps": {}, "residual_spectrum": {}} | dict(views)
     joints = list(views.get("joints") or diagnosis["fit"])
     units = {joint: views["maps"].get(joint, {}).get("unit", "N m") for joint in joints}
     return _template().render(
