@@ -73,9 +73,11 @@ def _write(
 ) -> None:  # fmt: skip
     """Recordings, diagnosis, report and truth into an empty folder, which will be `out`."""
     from irb140_jax.mismatch import save
+    from irb140_jax.recordings.conceal import sealed
     from irb140_jax.report import html_report
 
     shutil.copytree(desk, folder, dirs_exist_ok=True)
     save(result, folder)
     (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal, out), encoding="utf-8")
-    (folder / "truth.json").write_text(json.dumps(case.truth | {"seal": case.seal}, indent=1) + "\n", encoding="utf-8")
+    truth = case.truth | {"sealed": sealed(case.truth), "seal": case.seal}
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")

@@ -34,28 +34,28 @@ def html_report(
         reveal: What was hidden, where that is known (a demonstration).
         folder: Where diagnosis.json lies, for the commands that the report proposes.
     """
-    empty: dict[str, Any] = {name: [] for name in ("recordings", "ranking", "inertials", "motions")}
-    views = empty | {"maps": {}, "residual_spectrum": {}} | dict(views)
-    joints = list(views.get("joints") or diagnosis["fit"])
-    units = {joint: views["maps"].get(joint, {}).get("unit", "N m") for joint in joints}
+    known: dict[str, Any] = {"recordings": [], "ranking": [], "inertials": [], "motions": [], "maps": {}}
+    known |= {"residual_spectrum": {}} | dict(views)
+    joints = list(known.get("joints") or diagnosis["fit"])
+    units = {joint: known["maps"].get(joint, {}).get("unit", "N m") for joint in joints}
     return _template().render(
         diagnosis=diagnosis,
-        views=views,
+        views=known,
         joints=joints,
         units=units,
         title=text.VERDICTS.get(diagnosis["verdict"], text.words(diagnosis["verdict"])),
-        notes=diagnosis.get("notes") or views.get("notes") or [],
+        notes=diagnosis.get("notes") or known.get("notes") or [],
         provenance=diagnosis.get("provenance") or {},
         overview=overview(diagnosis, joints, units),
         steps=next_steps(diagnosis, str(folder)),
         reveal=reveal,
-        maps=[{"joint": joint, **figures.map_pair(data)} for joint, data in views["maps"].items()],
-        panels=[figures.panel(joint, units[joint], views["motions"]) for joint in joints if views["motions"]],
-        spectra=[figures.spectrum(joint, data, units[joint]) for joint, data in views["residual_spectrum"].items()],
-        ranking=_bars(views["ranking"]),
+        maps=[{"joint": joint, **figures.map_pair(data)} for joint, data in known["maps"].items()],
+        panels=[figures.panel(joint, units[joint], known["motions"]) for joint in joints if known["motions"]],
+        spectra=[figures.spectrum(joint, data, units[joint]) for joint, data in known["residual_spectrum"].items()],
+        ranking=_bars(known["ranking"]),
         models=MODELS,
         first_joint=_first_joint(diagnosis, joints),
-        data=_embedded({"units": units, "motions": views["motions"]}),
+        data=_embedded({"units": units, "motions": known["motions"]}),
         style=Markup((PAGE / "report.css").read_text(encoding="utf-8")),
         script=Markup((PAGE / "report.js").read_text(encoding="utf-8")),
     )
