@@ -179,7 +179,7 @@ def test_a_dead_torque_leaves_its_joint_out_and_says_so(sound, robot, tmp_path):
     tau = sound.tau.copy()
     tau[:, 1] = 0.0
     again = read(changed(sound, tau=tau), robot, tmp_path)
-    assert again.torque_lost.all(axis=0).tolist() == [False, True, False]
+    assert again.torque_lost is not None and again.torque_lost.all(axis=0).tolist() == [False, True, False]
     assert "tau.elbow is 0 in every row" in " ".join(again.notes) and "elbow is not judged" in " ".join(again.notes)
 
 
@@ -187,6 +187,7 @@ def test_a_torque_that_freezes_is_left_out_from_there_on(sound, robot, tmp_path)
     tau = sound.tau.copy()
     tau[1200:, 0] = tau[1200, 0]
     again = read(changed(sound, tau=tau), robot, tmp_path)
+    assert again.torque_lost is not None
     np.testing.assert_array_equal(np.flatnonzero(again.torque_lost[:, 0]), np.arange(1200, len(tau)))
     assert not again.torque_lost[:, 1:].any() and "tau.shoulder is frozen" in " ".join(again.notes)
 

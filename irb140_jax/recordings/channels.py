@@ -169,7 +169,7 @@ def _hypotheses(
     """Every hypothesis with what it costs in plausibility and what is explained under it."""
     names, n = recording.joint_names, robot.n
     again = lambda q, qd, qdd: nominal_torques(robot, q, qd, qdd)  # noqa: E731
-    for j in np.flatnonzero(judged):
+    for j in map(int, np.flatnonzero(judged)):
         sign = np.where(np.arange(n) == j, -1.0, 1.0)
         turned = seen._replace(q=sign * seen.q, qd=sign * seen.qd, qdd=sign * seen.qdd)
         other = again(turned.q, turned.qd, turned.qdd)
