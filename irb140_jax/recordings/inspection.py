@@ -12,9 +12,8 @@ import numpy as np
 
 from irb140_jax.errors import RecordingError
 from irb140_jax.recordings import guess
-from irb140_jax.recordings.channels import TOLD, health, torque_scales
+from irb140_jax.recordings.channel_health import TOLD, health, torque_scales
 from irb140_jax.recordings.check import RATES
-from irb140_jax.recordings.check_model import nominal_torques
 from irb140_jax.recordings.column_file import read_column_map
 from irb140_jax.recordings.columns import ColumnMap, renamed
 from irb140_jax.recordings.formats.options import Table
@@ -26,6 +25,7 @@ from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.table import read_table
 from irb140_jax.recordings.times import UNITS as TIME_FACTORS
 from irb140_jax.recordings.times import seconds_of_text, seconds_since_start
+from irb140_jax.recordings.torques import nominal_torques
 from irb140_jax.recordings.units import UNITS
 from irb140_jax.robot import Robot
 

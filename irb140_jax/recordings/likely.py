@@ -10,11 +10,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from irb140_jax.recordings.channels import TOLD, Scale, swapped, torque_scales
+from irb140_jax.recordings.channel_health import TOLD, Scale, swapped, torque_scales
+from irb140_jax.recordings.channels import channel_doubts
 from irb140_jax.recordings.check import MIN_SAMPLES
-from irb140_jax.recordings.check_model import CERTAIN, Torques, explained_shares, nominal_torques
 from irb140_jax.recordings.glance import Glance, glance
 from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.torques import Torques, nominal_torques
 from irb140_jax.recordings.units import CURRENTS, DEG, SHARES, UNITS
 from irb140_jax.robot import Robot
 
@@ -22,6 +23,7 @@ Channels = Mapping[str, np.ndarray]  # contract name -> values in the file's uni
 TURNS = 2 * np.pi + 1.0  # rad; a hinge that goes beyond is probably in degrees
 LARGEST_DEGREES = 720.0  # beyond two turns it is the motor that turns
 SAME = 3.0  # a factor that wrong masses, friction and gains may make
+CLEAR = 0.3  # of the torque's variance told by which its sign is worth a word
 BETTER = 0.1  # of the torque's variance by which one unit has to beat the other
 SURE = 3.0  # standard deviations that a scale has to be away from 0
 SPEEDS = {"rad/s": 1.0, "deg/s": 1 / DEG, "rpm": 60 / (2 * np.pi), "rev/s": 1 / (2 * np.pi)}
@@ -192,7 +194,7 @@ def _torque(stated: str | None, scale: Scale | None) -> Likely:
         why += "" if scale is None else f"; the model tells {max(scale.told, 0):.0%} of it"
         return Likely(stated or "N m", "", why)
     size, part = abs(scale.value), f"the model tells {scale.told:.0%} of it"
-    doubts = ("reversed? it falls where the model's torque rises",) if scale.value < 0 else ()
+    doubts = ("reversed? it falls where the model's torque rises",) if scale.value < 0 and scale.told > CLEAR else ()
     if stated in CURRENTS:
         constant = 1.0 / (scale.value * CURRENTS[str(stated)])
         return Likely(str(stated), "motor", f"1 A makes about {abs(constant):.3g} N m at the joint; {part}",
@@ -223,12 +225,10 @@ def _exchanged(
                        {f"q.{j}": Likely("rad", "", "") for j in joints})  # fmt: skip
         pairs = swapped(look.qd, speeds.q) if speeds is not None else []
         says += [f"Exchanged? qd.{joints[k]} follows q.{joints[j]}" for j, k in pairs]
-    if robot is not None and len(joints) > 1 and set(joints) <= set(robot.joint_names):
-        shares = explained_shares(look, _model(look, joints, robot))
-        own = np.diag(shares)
-        for j in range(len(joints)):
-            k = int(np.argmax(shares[j]))
-            if k > j and int(np.argmax(shares[k])) == j and min(shares[j, k], shares[k, j]) > CERTAIN and (
-                    max(own[j], own[k]) < CERTAIN / 2):  # fmt: skip
-                says.append(f"Exchanged? tau.{joints[k]} fits joint {joints[j]}, and tau.{joints[j]} joint {joints[k]}")
+    if robot is not None and joints == robot.joint_names and all(f"tau.{j}" in channels for j in joints):
+        # The same hypotheses by which reading refuses; sizes are judged above, in the file's unit.
+        alive = (np.std(look.tau, axis=0) > 0) & (look.travel > 0)
+        named = Recording(t=np.arange(float(len(look.q))), q=look.q, tau=look.tau, joint_names=joints)
+        found = channel_doubts(named, look, robot, alive, alive)
+        says += [f"{doubt.said[0].upper()}{doubt.said[1:]}" for doubt in found if doubt.kind != "unit"]
     return says
