@@ -1,0 +1,66 @@
+"""What the model discrepancy can stand for, and what it leaves to the laws: on a motion of one joint."""
+
+import numpy as np
+import pytest
+
+from irb140_jax.effects import Scales
+from irb140_jax.mismatch.regression.discrepancy import reversal_features, smooth_features
+from irb140_jax.recordings.condition import Conditioned
+
+RATE = 200.0
+T = np.arange(0.0, 20.0, 1.0 / RATE)
+WAVES = ((0.9, 0.31, 0.2), (0.4, 0.83, 1.1), (0.2, 1.37, 2.3))  # [rad], [Hz], [rad]
+Q = sum(a * np.sin(2 * np.pi * f * T + p) for a, f, p in WAVES)
+QD = sum(a * 2 * np.pi * f * np.cos(2 * np.pi * f * T + p) for a, f, p in WAVES)
+QDD = sum(-a * (2 * np.pi * f) ** 2 * np.sin(2 * np.pi * f * T + p) for a, f, p in WAVES)
+LOAD = 5.0 * np.cos(Q) + 0.3 * QDD
+SIGN = np.tanh(QD / 0.01)
+
+
+def features() -> np.ndarray:
+    """Both blocks along the motion, columns of RMS one, shape (T, 82)."""
+    column = lambda x: np.asarray(x)[:, None]  # noqa: E731
+    motion = Conditioned(
+        "motion", T, column(Q), column(QD), column(QDD), column(LOAD), np.ones((len(T), 1), bool), np.array([0.01]),
+        np.zeros(1), column(SIGN), np.zeros((len(T), 1)), (),
+    )  # fmt: skip
+    one = lambda x: np.array([x])  # noqa: E731
+    scales = Scales(one(np.abs(QD).max()), one(0.01), one(np.sqrt(np.mean(LOAD**2))), one(Q.min()), one(Q.max()), 20.0,
+                    one(0.3), one(0.0))  # fmt: skip
+    X = np.concatenate([f(motion, column(LOAD), scales, 0) for f in (smooth_features, reversal_features)], axis=1)
+    return X / np.sqrt(np.mean(X**2, axis=0))
+
+
+def explained(y: np.ndarray, size: float) -> float:
+    """Share of a torque of RMS one that the discrepancy explains, noise of 1 % beside a discrepancy of some RMS."""
+    X, y = features() * size / np.sqrt(features().shape[1]), y / np.sqrt(np.mean(y**2))
+    w = np.linalg.solve(X.T @ X + 1e-4 * np.eye(X.shape[1]), X.T @ y)
+    return 1.0 - float(np.mean((y - X @ w) ** 2))
+
+
+@pytest.mark.parametrize("law", ["dry", "viscous", "constant", "rotor"])
+def test_a_law_that_has_a_name_costs_the_discrepancy_far_more_than_what_it_stands_for(law):
+    """How large its amplitudes must be, in prior standard deviations, to take a law's place at 3 % of the torque."""
+    y = {"dry": SIGN, "viscous": QD, "constant": np.ones_like(Q), "rotor": QDD}[law]
+    X = features() * 0.03 / np.sqrt(features().shape[1])
+    w = np.linalg.lstsq(X, y / np.sqrt(np.mean(y**2)), rcond=1e-10)[0]
+    assert np.linalg.norm(w) > 100.0
+
+
+@pytest.mark.parametrize("travel", [1e-3, 5e-3])
+def test_bristles_of_any_travel_differ_from_dry_friction_by_what_the_discrepancy_holds(travel):
+    z, out = 0.0, np.empty_like(Q)
+    for i, dq in enumerate(np.diff(Q, prepend=Q[0])):  # Dahl, in small steps: no exponential
+        for _ in range(20):
+            z += (dq - np.abs(dq) * z) / (20 * travel)
+        out[i] = z
+    assert explained(out - SIGN, 1.0) > 0.95
+
+
+def test_friction_that_turns_late_differs_by_what_the_discrepancy_holds():
+    late = np.interp(T - 0.007, T, SIGN)
+    assert explained(late - SIGN, 1.0) > 0.8
+
+
+def test_friction_along_the_range_is_held_by_the_smooth_block():
+    assert explained(SIGN * np.exp(-(((Q - 0.2) / 0.6) ** 2)) - 0.5 * SIGN, 1.0) > 0.6
