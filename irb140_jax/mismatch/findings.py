@@ -73,7 +73,7 @@ def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     if beyond < CERTAIN:
         return []
     odds = stats.norm.logpdf(0.0, 0.0, GAIN_COMMON) - stats.norm.logpdf(0.0, w, std)
-    gain, spread = 1.0 / (1.0 + w), std / (1.0 + w) ** 2
+    gain, spread, way = 1.0 / (1.0 + w), std / (1.0 + w) ** 2, "large" if w > 0 else "small"
     return [{
         "effect": "torque_gain",
         "joints": list(robot.joint_names),
@@ -81,8 +81,8 @@ def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         "parameters": {"gain": {"value": gain, "std": spread, "unit": "1"}},
         "evidence": {"log_odds": float(odds), "probability": beyond, "heldout_gain": 0.0},
         "certain": (
-            f"The torque of all joints is logged {100 * abs(w):.3g} +- {100 * std:.2g} % too {'large' if w > 0 else 'small'} "
-            "for the stated masses; only a known payload tells wrong torque constants from masses all wrong alike."
+            f"The torque of all joints is logged {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} for the stated "
+            "masses; only a known payload tells wrong torque constants from masses all wrong alike."
         ),
         "alternatives": [],
     }]  # fmt: skip

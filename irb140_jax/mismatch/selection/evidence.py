@@ -212,7 +212,7 @@ def _near(setting: Setting) -> list[Setting]:
     most = [*([len(SIZES)] * (len(setting) - 1)), len(LEVELS)]
     out = []
     for axis, top in enumerate(most):
-        for step in (-1, 1, -2, 2):
+        for step in (-1, 1):
             if 0 <= setting[axis] + step < top:
                 out.append((*setting[:axis], setting[axis] + step, *setting[axis + 1 :]))
     return out

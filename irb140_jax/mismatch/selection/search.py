@@ -59,17 +59,18 @@ class Search:
                 best = other
         return best
 
-    def screened(
-        self, chosen: frozenset[int], joint: int, most: int = BEST, avoid: frozenset[str] = frozenset()
-    ) -> list[int]:
-        """The most promising candidates at a joint beside a set, the best of each kind and site.
+    def screened(self, chosen: frozenset[int], joint: int, most: int = BEST) -> list[int]:
+        """The most promising candidates at a joint beside a set, the best of each kind and site."""
+        return [i for _, i in self._scored(chosen, joint)[:most]]
+
+    def _scored(self, chosen: frozenset[int], joint: int) -> list[tuple[float, int]]:
+        """Log posterior of a set with each kind of candidate at a joint, best first, and the candidate.
 
         By the set's own settings or by those with less discrepancy and noise, whichever makes more of them.
         """
         space, settings = self.space, self.visited[chosen][1]
         bad = space.conflicts(tuple(chosen))
-        which = np.array([i for i in space.touching[joint] if not bad[i] and i not in chosen
-                          and space.candidates[i].slug not in avoid], dtype=int)  # fmt: skip
+        which = np.array([i for i in space.touching[joint] if not bad[i] and i not in chosen], dtype=int)
         if not len(which):
             return []
         own = settings[joint]
@@ -81,11 +82,11 @@ class Search:
             base = space.log_evidence(tuple(chosen), trial)
             if np.isfinite(base):
                 best = np.maximum(best, base + space.gains(tuple(chosen), trial, which))
-        kinds: dict[tuple[str, tuple[int, ...]], int] = {}
+        kinds: dict[tuple[str, tuple[int, ...]], tuple[float, int]] = {}
         for k in np.argsort(-best):
             c = space.candidates[which[k]]
-            if np.isfinite(best[k]) and len(kinds) < most:
-                kinds.setdefault((c.slug, c.joints), int(which[k]))
+            if np.isfinite(best[k]):
+                kinds.setdefault((c.slug, c.joints), (float(best[k]), int(which[k])))
         return list(kinds.values())
 
     def _joints(self, *members: int) -> set[int]:
@@ -119,29 +120,22 @@ class Search:
         return [p for p in itertools.combinations(sorted(now), 2) if self._joints(p[0]) & self._joints(p[1])]
 
     def _on_all_joints(self, now: frozenset[int]) -> frozenset[int]:
-        """One kind on every joint at once, or one effect of all joints in the place of all of a kind."""
+        """Another kind on every joint at once, or one effect of all joints, in the place of all of a kind."""
         space, tries = self.space, []
-        for slug in dict.fromkeys(c.slug for c in space.candidates if len(c.joints) == 1):
-            grown = now
+        kinds = [self._of(m).slug for m in now if len(self._of(m).joints) == 1 and not self._of(m).effect.ordinary]
+        for slug in dict.fromkeys(k for k in kinds if kinds.count(k) > 1):
+            rest = frozenset(m for m in now if self._of(m).slug != slug)
+            without = self.judged(rest, self.visited[now][1])
+            gained: dict[str, dict[int, tuple[float, int]]] = {}
             for j in range(len(space.joints)):
-                if not any(self._is(m, slug, j) for m in grown):
-                    self.judged(grown, self.visited[now][1], [j])
-                    kinds = {c.slug for c in space.candidates} - {slug}
-                    grown = grown | set(self.screened(grown, j, 1, frozenset(kinds)))
-            if len(grown) > len(now) + 1:
-                tries.append((grown, None))
-            alike = {m for m in now if space.candidates[m].slug == slug}
-            if len(alike) > 1:
-                rest = now - alike
-                self.judged(rest, self.visited[now][1])
-                several = {i for j in range(len(space.joints)) for i in self.screened(rest, j, 40)
-                           if len(space.candidates[i].joints) > 1}  # fmt: skip
-                tries += [(rest | {i}, None) for i in several]
+                for value, i in self._scored(rest, j):
+                    place = j if len(self._of(i).joints) == 1 else -1
+                    best = gained.setdefault(self._of(i).slug, {})
+                    best[place] = max(best.get(place, (0.0, i)), (value - without, i))
+            promise = {k: sum(max(g, 0.0) for g, _ in sites.values()) for k, sites in gained.items() if k != slug}
+            for kind in sorted(promise, key=lambda k: -promise[k])[:BEST]:
+                tries.append((rest | {i for g, i in gained[kind].values() if g > 0.0}, None))
         return self._best(now, tries)
-
-    def _is(self, member: int, slug: str, joint: int) -> bool:
-        c = self.space.candidates[member]
-        return c.slug == slug and joint in c.joints
 
     def _ordinary(self, now: frozenset[int]) -> frozenset[int]:
         """Ordinary friction for all friction of a joint."""
