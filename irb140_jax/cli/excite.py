@@ -1,7 +1,7 @@
 """irb140 excite."""
 
 import dataclasses
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
@@ -13,6 +13,11 @@ from irb140_jax.errors import InputError
 @dataclasses.dataclass(frozen=True)
 class Excite:
     """Write the motion that separates what is undecided."""
+
+    EXAMPLES: ClassVar = """\
+irb140 excite d --out motion.csv                              40 s at 250 rows per second
+irb140 excite d --out motion.csv --duration 20 --rate 500     shorter, for a faster controller
+irb140 diagnose old.csv played.csv --out d2                   with what the robot did along it"""
 
     folder: Folder
     """Folder of a diagnosis."""
