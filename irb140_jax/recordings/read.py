@@ -47,7 +47,7 @@ def read_recording(
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
     if recording.has_torque:
-        check_against_model(recording, seen, robot)
+        recording = check_against_model(recording, seen, robot)
     return dataclasses.replace(recording, source=path.name, sha256=checksum(path))
 
 
