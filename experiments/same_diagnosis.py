@@ -12,7 +12,6 @@ import sys
 import tempfile
 import time
 
-import numpy as np
 import tyro
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
@@ -35,18 +34,11 @@ class Config:
     """Two formats only."""
 
 
-def numbers(value: object) -> list[float]:
-    """Every number of a diagnosis, in order."""
-    if isinstance(value, dict):
-        return [x for inner in value.values() for x in numbers(inner)]
-    if isinstance(value, list | tuple):
-        return [x for inner in value for x in numbers(inner)]
-    return [float(value)] if isinstance(value, int | float) and not isinstance(value, bool) else []
-
-
-def said(diagnosis: dict) -> dict:
-    """What a diagnosis says of the robot, without where it came from."""
-    return {name: diagnosis[name] for name in ("verdict", "findings", "unexplained", "fit")}
+def said(diagnosis: dict) -> dict[tuple[str, str, str], float]:
+    """Every parameter of every finding, and the figures of the fit, whatever the order."""
+    found = {(f["effect"], " ".join(f["joints"]), name): parameter["value"]
+             for f in diagnosis["findings"] for name, parameter in f["parameters"].items()}  # fmt: skip
+    return found | {("fit", joint, name): value for joint, fit in diagnosis["fit"].items() for name, value in fit.items()}
 
 
 def run(config: Config) -> dict:
@@ -62,21 +54,19 @@ def run(config: Config) -> dict:
                 place.mkdir()
                 (place / "map.toml").write_text(lines or "")
                 recordings.append(read_recording(write(motion, place), robot, place / "map.toml" if lines else None))
-        found = said(diagnose(robot, recordings).diagnosis)
+        found = diagnose(robot, recordings).diagnosis
         first = found if first is None else first
         rows[kind] = compared(found, first) | {"seconds": round(time.perf_counter() - start, 1)}
         print(kind, rows[kind], flush=True)
     return {"verdict": first["verdict"] if first else "", "formats": rows}
 
 
-def compared(found: dict, first: dict) -> dict:
+def compared(diagnosis: dict, first: dict) -> dict:
     """How far a diagnosis is from the first one."""
-    named = lambda diagnosis: [(f["effect"], f["joints"]) for f in diagnosis["findings"]]  # noqa: E731
-    same = named(found) == named(first)
-    a, b = np.array(numbers(found)), np.array(numbers(first))
-    alike = len(a) == len(b)
-    off = float(np.max(np.abs(a - b) / np.maximum(np.abs(b), 1e-9))) if alike and len(a) else float("nan")
-    return {"verdict": found["verdict"], "same_findings": bool(same), "findings": len(found["findings"]),
+    found, wanted = said(diagnosis), said(first)
+    same = found.keys() == wanted.keys() and diagnosis["verdict"] == first["verdict"]
+    off = max(abs(found[k] - wanted[k]) / abs(wanted[k]) for k in wanted) if same else float("nan")
+    return {"verdict": diagnosis["verdict"], "same": same, "findings": len(diagnosis["findings"]),
             "largest_relative_difference": off}  # fmt: skip
 
 

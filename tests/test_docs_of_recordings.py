@@ -16,7 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "docs"), str(ROOT / "experiments")]
 
 import first_hour  # noqa: E402
-import make_controller_log  # noqa: E402
+import make_controller_log  # noqa: E402  # pyright: ignore[reportMissingImports]
 
 EXAMPLES = re.findall(r"```toml\n(.*?)```", (ROOT / "docs" / "columns.md").read_text(encoding="utf-8"), re.S)
 
