@@ -38,7 +38,8 @@ def said(diagnosis: dict) -> dict[tuple[str, str, str], float]:
     """Every parameter of every finding, and the figures of the fit, whatever the order."""
     found = {(f["effect"], " ".join(f["joints"]), name): parameter["value"]
              for f in diagnosis["findings"] for name, parameter in f["parameters"].items()}  # fmt: skip
-    return found | {("fit", joint, name): value for joint, fit in diagnosis["fit"].items() for name, value in fit.items()}
+    fit = diagnosis["fit"]
+    return found | {("fit", joint, name): value for joint in fit for name, value in fit[joint].items()}
 
 
 def run(config: Config) -> dict:
