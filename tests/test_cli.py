@@ -25,7 +25,7 @@ from irb140_jax.cli.parsing import parsed
 from irb140_jax.cli.shown import Share
 from irb140_jax.errors import InputError
 
-COMMANDS = ("diagnose", "predict", "demo", "excite")
+COMMANDS = ("diagnose", "predict", "demo", "excite", "inspect")
 
 
 def irb140(*words, cwd=None) -> subprocess.CompletedProcess:
@@ -260,7 +260,7 @@ def test_demo_shows_the_seal_then_diagnoses_files_then_reveals_the_truth(table, 
         "recordings/fast.csv", "recordings/slow.csv",
     }  # fmt: skip
     assert json.loads((out / "truth.json").read_text())["effects"] == [hidden]
-    assert "What was hidden, what was found" in (out / "report.html").read_text(encoding="utf-8")
+    assert "The truth: what was hidden" in (out / "report.html").read_text(encoding="utf-8")
     np.testing.assert_allclose(stub["recordings"][0].q, channels["q"], atol=1e-8)  # read back from the file
 
 
