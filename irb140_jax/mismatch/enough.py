@@ -70,8 +70,8 @@ def undecidable(
         name, unit = robot.joint_names[j], "N" if robot.is_slide[j] else "N m"
         if seconds[j] < SECONDS:
             out[int(j)] = (
-                f"{name} moves for {seconds[j]:.2g} s only: record at least {SECONDS:g} s in which it moves, better 20 s "
-                "with a dozen reversals"
+                f"{name} moves for {seconds[j]:.2g} s only: record at least {SECONDS:g} s in which it moves, better "
+                "20 s with a dozen reversals"
             )
         elif left[j] > LARGE * size[j]:
             out[int(j)] = (
@@ -80,7 +80,7 @@ def undecidable(
             )
         elif left[j] > max(NOT_SMALL * size[j], UNLIKE * scatter[j]):
             out[int(j)] = (
-                f"what is left on {name}, {left[j]:.3g} {unit}, is {left[j] / max(scatter[j], 1e-300):.2g} times what the "
-                "sensors scatter by and no small part of its torque: check its columns, and record longer motion"
+                f"what is left on {name}, {left[j]:.3g} {unit}, is {left[j] / max(scatter[j], 1e-300):.2g} times what "
+                "the sensors scatter by and no small part of its torque: check its columns, and record longer motion"
             )
     return out

@@ -1,4 +1,4 @@
-"""What the sensors scatter by, told from frequencies at which the arm does not move: never what a wrong model leaves."""
+"""What the sensors scatter by, seen where the arm does not move: never what a wrong model leaves."""
 
 import numpy as np
 
