@@ -29,6 +29,7 @@ from irb140_jax.recordings.check import MOVING
 from irb140_jax.recordings.condition import choose_band, conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.repeats import with_motions_numbered, without_copies
 from irb140_jax.robot import Robot
 
 SCHEMA = 2  # of diagnosis.json
@@ -105,9 +106,10 @@ def _diagnosed(
 ) -> Result:
     moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
     recordings = [with_lost_torque_marked(_finite(r), moves) for r in recordings]
+    recordings, twice = without_copies(recordings)
     progress("smoothing and differentiating the positions")
     band = choose_band(list(recordings), robot)
-    smooth = conditioned(recordings, band)
+    smooth, again = with_motions_numbered(conditioned(recordings, band), recordings)
     rows = [len(band.kept(len(r.t))) for r in smooth]
     if sum(rows) < FEWEST_ROWS or min(rows) < FEWEST_ROWS // 5:
         raise RecordingError(
@@ -131,7 +133,7 @@ def _diagnosed(
     origin = provenance(robot, recordings, config.options, config.words)
     scatter = sensor_scatter(robot, recordings, smooth, band)
     missing = undecidable(robot, proof, [s.tau for s in ex.data.stretches], scatter, band)
-    said = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()] + said
+    said = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()] + twice + again + said
     diagnosis = _document(robot, ex, proof, scatter, found, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said), open_)

@@ -101,7 +101,8 @@ def summary(
     what = f"{len(sources)} recording{'s' if len(sources) != 1 else ''} of {robot.n} joint{'s' if robot.n != 1 else ''}"
     parts = {
         "no_mismatch": (
-            f"The model explains {what} to what the sensors scatter by; nothing is left out that this motion could show."
+            f"The model explains {what} to what the sensors scatter by; nothing is left out that this motion could "
+            "show."
         ),
         "parameters_only": (
             f"Nothing is left out that {what} could show: refitted inertial parameters explain the torque."

@@ -43,6 +43,8 @@ class Conditioned:
         unsure: Standard deviation of the low-passed torque that the samples leave open, shape (T, n): see `_between`.
         notes: Repairs, as sentences.
         began: Time of the log's first row [s]; the smoother leaves out the first samples.
+        motion: Number of the motion, the same for recordings of one programme; -1: its own.
+        repeats: How many recordings there are of that motion.
         shaken: Standard deviation of what encoder noise leaves in qdd [rad/s^2 or m/s^2], shape (n,).
     """
 
@@ -60,6 +62,8 @@ class Conditioned:
     notes: tuple[str, ...]
     began: float = 0.0
     shaken: np.ndarray | None = None
+    motion: int = -1
+    repeats: int = 1
 
 
 def choose_band(recordings: list[Recording], robot: Robot) -> Band:
