@@ -64,7 +64,7 @@ def undecidable(
         band: Of the comparison.
     """
     size, left = torque_size(proof, torque), proof.rmse(proof.corrected)
-    seconds = sum(u.sum(axis=0) for u in proof.use) * band.step / band.rate
+    seconds = np.sum([u.sum(axis=0) for u in proof.use], axis=0) * band.step / band.rate
     out = {}
     for j in np.flatnonzero(proof.judged):
         name, unit = robot.joint_names[j], "N" if robot.is_slide[j] else "N m"
