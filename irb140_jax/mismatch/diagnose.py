@@ -15,7 +15,7 @@ from irb140_jax.mismatch import locate
 from irb140_jax.mismatch.enough import sensor_scatter, undecidable
 from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, explained_by, fitted, full_posterior
-from irb140_jax.mismatch.findings import findings, ranking
+from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding
 from irb140_jax.mismatch.model import CorrectedModel, Named
 from irb140_jax.mismatch.notes import notes
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, lasting, refitted, transferring
@@ -139,7 +139,8 @@ def _diagnosed(
     scatter = sensor_scatter(robot, recordings, smooth, band)
     missing = undecidable(robot, proof, [s.tau for s in ex.data.stretches], scatter, band)
     said = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()] + twice + again + said
-    diagnosis = _document(robot, ex, proof, scatter, found, rest, missing, seen, said, origin)
+    every = [*found, *torque_scale_finding(robot, ex)]
+    diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said), open_)
 

@@ -55,7 +55,6 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
             "certain": certain(robot, ex, index, w[rows], cov[rows, rows]),
             "alternatives": _alternatives(robot, ex, index),
         })  # fmt: skip
-    out += torque_scale_finding(robot, ex)
     return sorted(out, key=lambda f: -f["evidence"]["log_odds"])
 
 
