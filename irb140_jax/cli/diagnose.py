@@ -21,7 +21,7 @@ class Diagnose:
     """Name the physics that a model leaves out of recordings."""
 
     recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
-    """Recordings (CSV, Parquet or NPZ), best of several motions."""
+    """Recordings (CSV, Parquet, NPZ, MAT, ROS bag, MCAP, LeRobot), best of several motions."""
 
     out: Out
     """Folder for diagnosis.json and report.html: new, empty, or a former diagnosis, which is replaced."""
