@@ -15,6 +15,7 @@ import dataclasses
 import importlib
 import json
 import pathlib
+import re
 import tempfile
 import time
 from collections.abc import Callable
@@ -85,7 +86,7 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
         out["sentences"] = [x["sentence"] for x in result.views.get("inertials", []) if x["sentence"]]
         out |= _compared(case, result, [mismatch.predict(result.model, r) for r in unseen])
     except InputError as error:
-        out["refused"] = str(error)
+        out["refused"] = re.sub(r"\S*/(?=\w+\.\w+)", "", str(error))  # file names, without this machine's folders
     except Exception as error:  # a crash is a result, too
         out["failed"] = f"{type(error).__name__}: {error}"
     return out
