@@ -39,7 +39,10 @@ def couplings(model: mujoco.MjModel, mimics: tuple[tuple[str, str, float, float]
 
 def _mimics(model: mujoco.MjModel, mimics: tuple[tuple[str, str, float, float], ...]) -> Iterator[Coupling]:
     for follower, leader, factor, offset in mimics:
-        j, k = model.joint(follower).id, model.joint(leader).id
+        j, k = model.joint(follower).id, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, leader)
+        if k < 0:
+            yield Coupling((j,), f"it mimics '{leader}', a joint that does not move or is not there")
+            continue
         at = int(model.jnt_qposadr[k])
         yield Coupling((j, k), f"'{follower}' mimics '{leader}', so that one motor moves both", j,
                        lambda qpos, at=at, a=factor, b=offset: a * qpos[at] + b)  # fmt: skip
