@@ -239,7 +239,7 @@ def test_demo_shows_the_seal_then_diagnoses_files_then_reveals_the_truth(table, 
             irb140_jax.recordings.Recording(t=table["t"].to_numpy(), joint_names=joints, source=name, **channels)
             for name in ("fast", "slow")
         ],
-        truth={"schema": 1, "effects": [hidden]},
+        truth={"schema": 1, "seed": 3, "effects": [hidden]},
         seal="5ea1" * 16,
     )
     import irb140_jax.recordings.conceal as conceal

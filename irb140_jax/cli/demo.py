@@ -49,7 +49,7 @@ class Demo:
         terminal.print(said, soft_wrap=True)
         result = _from_files(case, results.desk)
         reveal = revealed(case.truth["effects"], result.diagnosis, case.seal)
-        folder = results.write(lambda folder: _write(result, reveal, case, results.desk, folder))
+        folder = results.write(lambda folder: _write(result, reveal, case, results.desk, folder, out))
         tell_kept(results)
         show(result, out if folder == results.folder else folder)
         print_reveal(reveal, terminal)
@@ -67,12 +67,17 @@ def _from_files(case: "ConcealedCase", desk: pathlib.Path) -> "Result":
     return diagnosed(robot, [read_recording(path, robot) for path in paths])
 
 
-def _write(result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path) -> None:
-    """Recordings, diagnosis, report and truth into an empty folder."""
+def _write(
+    result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path,
+    out: pathlib.Path,
+) -> None:  # fmt: skip
+    """Recordings, diagnosis, report and truth into an empty folder, which will be `out`."""
     from irb140_jax.mismatch import save
+    from irb140_jax.recordings.conceal import sealed
     from irb140_jax.report import html_report
 
     shutil.copytree(desk, folder, dirs_exist_ok=True)
     save(result, folder)
-    (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal), encoding="utf-8")
-    (folder / "truth.json").write_text(json.dumps(case.truth | {"seal": case.seal}, indent=1) + "\n", encoding="utf-8")
+    (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal, out), encoding="utf-8")
+    truth = case.truth | {"sealed": sealed(case.truth), "seal": case.seal}
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")

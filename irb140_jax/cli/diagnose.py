@@ -48,7 +48,7 @@ class Diagnose:
         inputs = [path for path in (*self.recordings, self.robot, self.columns) if path]
         with results_folder(self.out, "irb140 diagnose", inputs) as results:
             result = self._diagnosed()
-            folder = results.write(lambda folder: _write(result, folder))
+            folder = results.write(lambda folder: _write(result, folder, self.out))
             tell_kept(results)
             show(result, self.out if folder == results.folder else folder)
 
@@ -77,13 +77,13 @@ def diagnosed(
         return diagnose(robot, recordings, config, tell)
 
 
-def _write(result: "Result", folder: pathlib.Path) -> None:
-    """Diagnosis, model and report into an empty folder."""
+def _write(result: "Result", folder: pathlib.Path, out: pathlib.Path) -> None:
+    """Diagnosis, model and report into an empty folder, which will be `out`."""
     from irb140_jax.mismatch import save
     from irb140_jax.report import html_report
 
     save(result, folder)
-    (folder / "report.html").write_text(html_report(result.diagnosis, result.views), encoding="utf-8")
+    (folder / "report.html").write_text(html_report(result.diagnosis, result.views, folder=out), encoding="utf-8")
 
 
 def show(result: "Result", out: pathlib.Path) -> None:

@@ -193,7 +193,7 @@ def _views(
         "joints": list(robot.joint_names),
         "recordings": names,
         "maps": locate.maps(robot, ex, proof),
-        "traces": locate.traces(robot, ex, proof, names),
+        "motions": locate.motions(robot, ex, proof, names),
         "ranking": ranking(robot, ex),
         "residual_spectrum": locate.spectra(robot, ex, proof),
         "inertials": inertial_views(robot, ex),

@@ -20,6 +20,8 @@ from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot, with_phi
 
+SCHEMA = 1  # of model.json
+
 
 @dataclasses.dataclass(frozen=True)
 class Named:
@@ -209,7 +211,7 @@ def to_json(model: CorrectedModel) -> dict[str, Any]:
     leaves = {f.name: np.asarray(getattr(arrays, f.name)).tolist() for f in dataclasses.fields(Robot)
               if eqx.is_array(getattr(arrays, f.name))}  # fmt: skip
     return {
-        "schema": 1,
+        "schema": SCHEMA,
         "robot": {
             "leaves": _finite(leaves), "joint_names": static.joint_names, "is_slide": static.is_slide,
             "name": static.name, "parent": static.parent,
