@@ -82,7 +82,7 @@ def choose(said: Description, wish: Wish) -> Choice:
     joints, parent = _in_branches(model, joints, last)
     qpos = _held_pose(model, names, wish, joints, coupled)
     carrier = tuple(_carrier(model, body, joints) for body in range(model.nbody))
-    notes = (*_held_notes(model, joints, qpos, left_out), *_tool_note(names, joints, parent))
+    notes = (*_held_notes(model, joints, qpos, left_out), *_tree_notes(names, joints, parent))
     return Choice(tuple(joints), parent, qpos, carrier, notes)
 
 
@@ -240,13 +240,15 @@ def _position(model: mujoco.MjModel, joint: int, qpos: np.ndarray) -> str:
     return f"{_joint(model, joint)} at {value:.4g} {unit}{outside}"
 
 
-def _tool_note(names: list[str], joints: list[int], parent: Parents) -> Iterator[str]:
+def _tree_notes(names: list[str], joints: list[int], parent: Parents) -> Iterator[str]:
     n = len(joints)
     if path(parent, n - 1) != tuple(range(n)):
         yield (
             f"the robot branches; payload, contact and pushes are looked for on the link of its last joint, "
             f"'{names[joints[-1]]}'"
         )
+    if parent.count(-1) > 1:
+        yield "its branches part at the base, which is taken to stand still"
 
 
 def _joint(model: mujoco.MjModel, joint: int) -> str:
