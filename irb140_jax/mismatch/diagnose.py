@@ -23,6 +23,8 @@ from irb140_jax.mismatch.testable import Site, not_testable, reference, visibili
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
 from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
+from irb140_jax.recordings.channels import with_lost_torque_marked
+from irb140_jax.recordings.check import MOVING
 from irb140_jax.recordings.condition import choose_band, conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
@@ -100,6 +102,8 @@ def diagnose(
 def _diagnosed(
     robot: Robot, recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None]
 ) -> Result:
+    moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
+    recordings = [with_lost_torque_marked(_finite(r), moves) for r in recordings]
     progress("smoothing and differentiating the positions")
     band = choose_band(list(recordings), robot)
     smooth = conditioned(recordings, band)
@@ -127,6 +131,23 @@ def _diagnosed(
     diagnosis = _document(robot, ex, proof, found, rest, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said), open_)
+
+
+def _finite(recording: Recording) -> Recording:
+    """The recording, if it is made of numbers.
+
+    Raises:
+        RecordingError: It isn't.
+    """
+    for name in ("t", "q", "tau"):
+        bad = np.argwhere(~np.isfinite(getattr(recording, name)))
+        if len(bad):
+            column = name if name == "t" else f"{name}.{recording.joint_names[bad[0][1]]}"
+            raise RecordingError(
+                f"{recording.source}: {column}, sample {bad[0][0] + 1}: not a finite number; a diagnosis needs time, "
+                "positions and torque in every sample: read the file with read_recording, which mends a few gaps"
+            )
+    return recording
 
 
 def _proved(ex: Explanation, progress: Callable[[str], None]) -> tuple[Refit, HeldOut, list[Unexplained]]:

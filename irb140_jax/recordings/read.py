@@ -47,7 +47,7 @@ def read_recording(
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
     if recording.has_torque:
-        check_against_model(recording, seen, robot)
+        recording = check_against_model(recording, seen, robot)
     return dataclasses.replace(recording, source=path.name, sha256=checksum(path))
 
 
@@ -190,6 +190,12 @@ def _numbers(
         else:
             notes.append(f"Column {name} holds text and is left out")
     return numbers
+
+
+def as_numbers(table: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[str]]:
+    """The columns that hold numbers, as floats, and a note on each that does not."""
+    notes: list[str] = []
+    return _numbers(table, [], pathlib.Path(), notes), notes
 
 
 def _as_floats(values: np.ndarray) -> tuple[np.ndarray, int | None]:
