@@ -118,8 +118,8 @@ def written(rows: list[Row], more: list[Row]) -> str:
     lines = [
         "# Robots that load",
         "",
-        "Written by `experiments/robots_of_example_robot_data.py`, which says how to get the files. No file was edited, "
-        "and no mesh is read.",
+        "Written by `experiments/robots_of_example_robot_data.py`, which says how to get the files. No file was "
+        "edited, and no mesh is read.",
         "",
         f"Of {len(rows)} URDFs in the package `example-robot-data`, {as_is} load as they are, and {usable} with a "
         "floating base held or the joints of a limb named, as the columns of a recording name them.",
