@@ -2,7 +2,7 @@
 
 import dataclasses
 import pathlib
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
@@ -17,6 +17,11 @@ if TYPE_CHECKING:
 @dataclasses.dataclass(frozen=True)
 class Inspect:
     """Look at recordings of any format: channels, likely units, doubts; write a column map to start from."""
+
+    EXAMPLES: ClassVar = """\
+irb140 inspect log.csv                                                what is in it, in which units
+irb140 inspect log.mcap --robot arm.urdf --write-columns map.toml     a map to check and to go on with
+irb140 inspect log.csv --robot arm.urdf --columns map.toml            the log as the map has it"""
 
     recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
     """Recordings: CSV, Parquet, NPZ, MAT, ROS bags, MCAP, LeRobot."""
