@@ -35,7 +35,7 @@ def common_joints(paths: Sequence[Path], columns: Path | None, known_joint_names
 
 
 def _refuse_halves(path: Path, columns: Path | None, known: tuple[str, ...], joints: tuple[str, ...]) -> None:
-    table = named_columns(path, columns, known)
+    table, _ = named_columns(path, columns, known)
     if not joints:
         return
     for name in known:
