@@ -2,11 +2,13 @@
 
 import dataclasses
 import pathlib
-from typing import TYPE_CHECKING, Annotated
+from json import dumps
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
-from irb140_jax.cli.options import Columns, Out
+from irb140_jax.cli.options import Columns, Hold, Out
+from irb140_jax.cli.robots import held_positions, recorded_robot
 from irb140_jax.cli.shown import console, progress, tell_kept
 from irb140_jax.errors import InputError
 
@@ -15,13 +17,32 @@ if TYPE_CHECKING:
     from irb140_jax.recordings import Recording
     from irb140_jax.robot import Robot
 
+# Share of the processor time that is over when a step begins, as measured on the demonstration.
+STEPS = {
+    "rigid body along": 0.05,
+    "explanations along the recordings (round 1)": 0.24,
+    "sets of explanations (round 1)": 0.35,
+    "explanations along the recordings (round 2)": 0.56,
+    "sets of explanations (round 2)": 0.65,
+    "explanations along the recordings (round 3)": 0.80,
+    "sets of explanations (round 3)": 0.87,
+    "proving on data": 0.95,
+}
+
 
 @dataclasses.dataclass(frozen=True)
 class Diagnose:
     """Name the physics that a model leaves out of recordings."""
 
+    EXAMPLES: ClassVar = """\
+irb140 diagnose fast.csv slow.csv --out d                        the ABB IRB 140, in SI units
+irb140 diagnose log.parquet --robot arm.urdf --out d             your robot, as MJCF or URDF
+irb140 diagnose left.csv --robot two_arms.urdf --hold torso=0.2 --out d    one arm of two; the rest stood still
+irb140 diagnose log.csv --robot arm.xml --columns map.toml --out d     other names and units
+irb140 diagnose log.csv --out d --json > diagnosis.json          for a program"""
+
     recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
-    """Recordings (CSV, Parquet or NPZ), best of several motions."""
+    """Recordings (CSV, Parquet, NPZ, MAT, ROS bag, MCAP, LeRobot), best of several motions."""
 
     out: Out
     """Folder for diagnosis.json and report.html: new, empty, or a former diagnosis, which is replaced."""
@@ -34,6 +55,16 @@ class Diagnose:
 
     columns: Columns = None
     """TOML file that maps other column names and units."""
+
+    hold: Hold = ()
+    """Joint that stood still and where [rad or m], any number of times; other joints without columns are
+    taken to be at the model's reference, mostly zero."""
+
+    fix_base: bool = False
+    """The base, which floats in the model, stood still."""
+
+    json: bool = False
+    """Print diagnosis.json, and what is meant for people to stderr."""
 
     def run(self) -> None:
         if not self.recordings:
@@ -50,20 +81,22 @@ class Diagnose:
             result = self._diagnosed()
             folder = results.write(lambda folder: _write(result, folder, self.out))
             tell_kept(results)
-            show(result, self.out if folder == results.folder else folder)
+            show(result, self.out if folder == results.folder else folder, json=self.json)
 
     def _diagnosed(self) -> "Result":
         from irb140_jax.recordings import read_recording
-        from irb140_jax.robot import irb140, load_robot
 
-        robot = load_robot(self.robot) if self.robot else irb140()
+        hold = held_positions(self.hold)
+        robot = recorded_robot(self.robot, self.recordings, self.columns, hold, self.fix_base)
         recordings = [read_recording(path, robot, columns=self.columns) for path in self.recordings]
         return diagnosed(robot, recordings, self.inertial_uncertainty, self._words())
 
     def _words(self) -> tuple[str, ...]:
-        """Options that name files, as the diagnosis keeps them."""
+        """Options that name files or joints, as the diagnosis keeps them."""
         files = {"--robot": self.robot, "--columns": self.columns}
-        return tuple(word for option, path in files.items() if path for word in (option, path.name))
+        named = [word for option, path in files.items() if path for word in (option, path.name)]
+        held = [word for joint in self.hold for word in ("--hold", joint)]
+        return (*named, *held, *(["--fix-base"] if self.fix_base else []))
 
 
 def diagnosed(
@@ -72,7 +105,7 @@ def diagnosed(
     """The diagnosis, with its progress shown."""
     from irb140_jax.mismatch import DiagnoseConfig, diagnose
 
-    with progress() as tell:
+    with progress(STEPS) as tell:
         config = DiagnoseConfig(inertial_uncertainty=inertial_uncertainty, words=words)
         return diagnose(robot, recordings, config, tell)
 
@@ -86,10 +119,12 @@ def _write(result: "Result", folder: pathlib.Path, out: pathlib.Path) -> None:
     (folder / "report.html").write_text(html_report(result.diagnosis, result.views, folder=out), encoding="utf-8")
 
 
-def show(result: "Result", out: pathlib.Path) -> None:
-    """The plain-language summary, and where the rest is."""
+def show(result: "Result", out: pathlib.Path, *, json: bool = False) -> None:
+    """The plain-language summary, and where the rest is; both beside the diagnosis as JSON, where that is wanted."""
     from irb140_jax.report import print_diagnosis
 
-    terminal = console()
+    terminal = console(stderr=json)
     print_diagnosis(result.diagnosis, result.views, terminal)
     terminal.print(f"Report: {out / 'report.html'}", soft_wrap=True)
+    if json:
+        print(dumps(result.diagnosis, indent=1, allow_nan=False))
