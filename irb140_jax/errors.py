@@ -14,3 +14,7 @@ class RobotError(InputError):
 
 class RecordingError(InputError):
     """The recording can't be used: names file, column, row and remedy."""
+
+
+class MisplacedResultError(Exception):
+    """The work is done, but its result could not be put where it was wanted; the message says where it is."""

@@ -1,94 +1,27 @@
 """The command line: complete help, errors of one line with exit code 2, results whole or not at all."""
 
+# ruff: noqa: F811 (fixtures are used by the name under which they are imported)
+
 import json
 import os
-import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 import types
 
 import helpers_report
-import mujoco
 import numpy as np
 import pandas as pd
 import pytest
+from helpers_cli import MODEL, recording, refused, stub, table  # noqa: F401
 
 import irb140_jax.mismatch
 import irb140_jax.recordings
 from irb140_jax import cli
 from irb140_jax.errors import InputError
 
-MODEL = pathlib.Path(__file__).parents[1] / "assets" / "irb140.xml"
 COMMANDS = ("diagnose", "predict", "demo", "excite")
-
-
-def table_of_a_motion(seconds: float = 12.0, rate: float = 100.0) -> pd.DataFrame:
-    """A recording of the IRB 140 along sums of sines; torque by MuJoCo, with some noise."""
-    model = mujoco.MjModel.from_xml_path(str(MODEL))
-    data = mujoco.MjData(model)
-    rng = np.random.default_rng(1)
-    t = np.arange(0.0, seconds, 1.0 / rate)
-    w = 2 * np.pi * np.array([0.2, 0.35, 0.55])
-    a, phase = rng.uniform(0.1, 0.3, (3, model.nv)), rng.uniform(0, 6, (3, model.nv))
-    angle = w[:, None, None] * t[None, :, None] + phase[:, None]
-    q = (a[:, None] * np.sin(angle)).sum(0)
-    qd = (a[:, None] * w[:, None, None] * np.cos(angle)).sum(0)
-    qdd = (-a[:, None] * w[:, None, None] ** 2 * np.sin(angle)).sum(0)
-    tau = np.empty_like(q)
-    for i in range(len(t)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q[i], qd[i], qdd[i]
-        mujoco.mj_inverse(model, data)
-        tau[i] = data.qfrc_inverse
-    tau += 0.01 * tau.std(0) * rng.standard_normal(tau.shape)
-    names = [model.joint(i).name for i in range(model.njnt)]
-    columns = {"t": t} | {f"q.{j}": q[:, i] for i, j in enumerate(names)}
-    return pd.DataFrame(columns | {f"tau.{j}": tau[:, i] for i, j in enumerate(names)})
-
-
-@pytest.fixture(scope="module")
-def table() -> pd.DataFrame:
-    return table_of_a_motion()
-
-
-@pytest.fixture
-def recording(table, tmp_path) -> pathlib.Path:
-    """A recording that can be used, in a folder of its own."""
-    path = tmp_path / "in" / "wave.csv"
-    path.parent.mkdir()
-    table.to_csv(path, index=False)
-    return path
-
-
-@pytest.fixture
-def stub(monkeypatch):
-    """A diagnosis that takes no time; the command line around it is the real one."""
-    result = types.SimpleNamespace(diagnosis=helpers_report.example_diagnosis(), views=helpers_report.example_views())
-    seen = {}
-
-    def diagnose(robot, recordings, config, progress):
-        progress("looking")
-        seen.update(robot=robot, recordings=recordings, config=config)
-        return result
-
-    def save(result, out_dir):
-        (out_dir / "diagnosis.json").write_text(json.dumps(result.diagnosis))
-        (out_dir / "model.json").write_text("{}")
-
-    def predict(model, recording):
-        return {name: k * np.asarray(recording.tau) for k, name in enumerate(("nominal", "refit", "corrected"))}
-
-    def load_model(folder):
-        from irb140_jax.robot import load_robot
-
-        return types.SimpleNamespace(robot=load_robot(MODEL))
-
-    for function in (diagnose, save, predict, load_model):
-        monkeypatch.setattr(irb140_jax.mismatch, function.__name__, function, raising=False)
-    monkeypatch.setattr(
-        irb140_jax.mismatch, "DiagnoseConfig", lambda **kwargs: types.SimpleNamespace(**kwargs), raising=False
-    )
-    return seen
 
 
 def irb140(*words, cwd=None) -> subprocess.CompletedProcess:
@@ -96,14 +29,6 @@ def irb140(*words, cwd=None) -> subprocess.CompletedProcess:
     environment = os.environ | {"PYTHONPATH": str(MODEL.parents[1]), "COLUMNS": "100"}
     command = [sys.executable, "-m", "irb140_jax", *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=cwd, env=environment)
-
-
-def refused(capsys, *words) -> str:
-    """The one line that a command says when it refuses its input."""
-    assert cli.main([str(word) for word in words]) == 2
-    said = capsys.readouterr().err
-    assert said.endswith("\n") and said.count("\n") == 1, said
-    return said
 
 
 def test_the_help_has_one_line_for_every_command():
@@ -151,7 +76,11 @@ def test_the_help_imports_nothing_heavy():
         (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "much"], "--inertial-uncertainty"),
         (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "-0.1"], "--inertial-uncertainty"),
         (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "nan"], "--inertial-uncertainty"),
+        (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "5"], "--inertial-uncertainty"),
+        (["diagnose", "a.csv", "--out", "d", "--inertial-uncertainty", "inf"], "--inertial-uncertainty"),
         (["demo", "--seed", "-1"], "--seed"),
+        (["demo", "--seed", "nan"], "--seed"),
+        (["demo", "--seed", "9" * 5000], "--seed"),
         (["excite", "d", "--out", "f.csv"], "model.json"),
     ],
 )
@@ -200,19 +129,12 @@ def test_diagnose_writes_diagnosis_model_and_report_and_says_the_verdict(recordi
     assert (
         cli.main(["diagnose", str(recording), str(recording), "--out", str(out), "--inertial-uncertainty", "0.1"]) == 0
     )
-    assert sorted(path.name for path in out.iterdir()) == ["diagnosis.json", "model.json", "report.html"]
+    files = ["diagnosis.json", "manifest.json", "model.json", "report.html"]
+    assert sorted(path.name for path in out.iterdir()) == files
     assert [path.name for path in out.parent.iterdir()] == ["d"]  # no scratch folder is left behind
     assert "Physics left out." in capsys.readouterr().out
     assert len(stub["recordings"]) == 2 and stub["config"].inertial_uncertainty == 0.1
     assert stub["robot"].joint_names == helpers_report.JOINTS
-
-
-def test_a_former_diagnosis_is_replaced_as_a_whole(recording, tmp_path, stub):
-    out = tmp_path / "d"
-    assert cli.main(["diagnose", str(recording), "--out", str(out)]) == 0
-    (out / "stale.txt").write_text("x")
-    assert cli.main(["diagnose", str(recording), "--out", str(out)]) == 0
-    assert not (out / "stale.txt").exists() and (out / "report.html").exists()
 
 
 @pytest.mark.parametrize("error", [InputError("two lines\nof trouble"), RuntimeError("a bug")])
@@ -227,11 +149,41 @@ def test_a_run_that_breaks_off_leaves_a_former_diagnosis_as_it_was(recording, tm
     monkeypatch.setattr(irb140_jax.mismatch, "save", broken)
     if isinstance(error, InputError):
         assert cli.main(["diagnose", str(recording), "--out", str(out)]) == 2
-    else:  # a bug keeps its traceback, and Python its exit code 1
-        with pytest.raises(RuntimeError):
-            cli.main(["diagnose", str(recording), "--out", str(out)])
+    else:
+        monkeypatch.chdir(tmp_path / "in")  # where the file with the traceback goes
+        assert cli.main(["diagnose", str(recording), "--out", str(out)]) == 3
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["d", "in"]
+
+
+def test_an_unexpected_error_ends_with_one_line_and_a_file_that_tells_the_rest(
+    recording, tmp_path, capsys, stub, monkeypatch
+):
+    def broken(*_):
+        raise ZeroDivisionError("in the\nmiddle")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(irb140_jax.mismatch, "diagnose", broken)
+    for count in (1, 2):  # a second one does not replace the first
+        assert cli.main(["diagnose", str(recording), "--out", "a name"]) == 3
+        said = capsys.readouterr().err
+        files = sorted(tmp_path.glob("irb140-error-*.txt"))
+        assert len(files) == count and said.count("\n") == 1
+        assert "ZeroDivisionError: in the middle" in said and "please send irb140-error-" in said
+    text = files[0].read_text()
+    assert f"irb140 diagnose {recording} --out 'a name'" in text and "jaxlib 0." in text
+    assert "Traceback" in text and "in broken" in text and "ZeroDivisionError" in text
+    assert not (tmp_path / "a name").exists()
+
+
+def test_where_the_current_folder_cannot_be_written_to_the_file_goes_to_that_for_temporary_ones(tmp_path, monkeypatch):
+    from irb140_jax.cli.unexpected import report
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.chdir("/sys")  # where not even the superuser makes files
+    said = report(ValueError("x"), ["excite"])
+    (file,) = tmp_path.iterdir()
+    assert str(file) in said
 
 
 @pytest.mark.parametrize("buffered", [True, False])
@@ -300,7 +252,8 @@ def test_demo_shows_the_seal_then_diagnoses_files_then_reveals_the_truth(table, 
         assert 0 <= said.index(case.seal) < said.index("Physics left out") < said.index("The truth, now revealed")
     names = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
     assert names == {
-        "diagnosis.json", "model.json", "report.html", "truth.json", "recordings/fast.csv", "recordings/slow.csv",
+        "diagnosis.json", "manifest.json", "model.json", "report.html", "truth.json",
+        "recordings/fast.csv", "recordings/slow.csv",
     }  # fmt: skip
     assert json.loads((out / "truth.json").read_text())["effects"] == [hidden]
     assert "What was hidden, what was found" in (out / "report.html").read_text(encoding="utf-8")

@@ -189,7 +189,12 @@ def test_excite_writes_a_motion_that_is_the_same_for_the_same_seed(tmp_path, cap
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
-@pytest.mark.parametrize("words", [["--duration", "2"], ["--rate", "3"], ["--seed", "-1"]])
+@pytest.mark.parametrize(
+    "words", [
+        ["--duration", "2"], ["--duration", "nan"], ["--duration", "inf"], ["--duration", "1e9"], ["--rate", "3"],
+        ["--rate", "nan"], ["--rate", "1e9"], ["--rate", "-inf"], ["--seed", "-1"],
+    ],
+)  # fmt: skip
 def test_excite_refuses_times_that_make_no_motion(words, tmp_path, capsys):
     save(slow_case()[1], tmp_path)
     assert cli.main(["excite", str(tmp_path), "--out", str(tmp_path / "a.csv"), *words]) == 2

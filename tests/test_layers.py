@@ -106,3 +106,33 @@ def test_the_mujoco_oracle_shares_no_code_with_what_it_judges():
     for path in (PACKAGE / "oracle").rglob("*.py"):
         for line, target in imported_parts(path.read_text(encoding="utf-8"), ("oracle", path.stem)):
             assert target in ("types", "errors", "robot", "oracle"), f"{path.name}:{line} imports {target}"
+
+
+def outside_imports(path: pathlib.Path) -> set[str]:
+    """First names of everything that a module imports, wherever in it."""
+    tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    names = [a.name for node in tree if isinstance(node, ast.Import) for a in node.names]
+    tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    names += [node.module or "" for node in tree if isinstance(node, ast.ImportFrom) and not node.level]
+    return {name.partition(".")[0] for name in names}
+
+
+TESTBED = sorted((PACKAGE.parent / "testbed").rglob("*.py"))
+
+
+def test_the_testbed_is_made_by_nothing_that_it_judges():
+    assert len(TESTBED) > 8
+    calling = {path.name for path in TESTBED if outside_imports(path) & {"irb140_jax", "jax", "equinox", "experiments"}}
+    assert calling == {"runner.py"}
+
+
+def test_the_testbed_takes_no_dynamics_and_no_friction_from_mujoco():
+    # It compiles a model's text in one place, and that is all.
+    using = {path.name for path in TESTBED if "mujoco" in outside_imports(path)}
+    assert using == {"arms.py"}
+    assert "mj_" not in (PACKAGE.parent / "testbed" / "arms.py").read_text(encoding="utf-8")
+
+
+def test_nothing_of_the_package_knows_the_testbed():
+    for path in PACKAGE.rglob("*.py"):
+        assert "testbed" not in outside_imports(path), f"{path.name} imports testbed"

@@ -1,5 +1,6 @@
 """Columns are slopes of the corrected model's torque at the last explanation, whatever multiplies what."""
 
+import equinox as eqx
 import numpy as np
 import pytest
 
@@ -119,3 +120,21 @@ def test_inertials_alone_are_refitted_to_the_plain_log(explained):
     np.testing.assert_allclose(bare.X, plain.X[..., columns])
     np.testing.assert_allclose(bare.y, plain.y)
     assert not np.allclose(rows.X[..., columns], plain.X[..., columns])
+
+
+def test_a_spring_that_buckles_under_the_weight_is_no_law_of_this_motion():
+    def moved_by(compliance: float, robot) -> np.ndarray:
+        spring = Named(CATALOGUE["joint_elasticity"], (1,), (0,), np.ones(1), np.array([compliance]))
+        model = CorrectedModel(robot, np.asarray(robot.phi), np.asarray(robot.phi), (spring,), BAND, SMOOTH.rest_speed)
+        return columns_along(library_of(model), prepared(robot, SMOOTH)).effects
+
+    heavy = eqx.tree_at(lambda r: r.gravity, ROBOT, 20.0 * ROBOT.gravity)
+    assert moved_by(1e-5, heavy).any()
+    assert not moved_by(10.0, heavy).any()
+
+
+def test_what_effects_see_are_bodies_that_can_be():
+    wild = np.asarray(ROBOT.phi) * np.array([-1.0, 1.2, 1.0])[:, None]
+    seen = better_known(ROBOT, wild, [])
+    assert (np.asarray(seen.mass) > 0.0).all()
+    assert (np.linalg.eigvalsh(np.asarray(seen.inertia)) > 0.0).all()

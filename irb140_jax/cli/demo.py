@@ -3,17 +3,19 @@
 import dataclasses
 import json
 import pathlib
-from collections.abc import Callable
+import shutil
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
 from irb140_jax.cli.diagnose import diagnosed, show
-from irb140_jax.cli.shown import console, progress
+from irb140_jax.cli.shown import console, progress, tell_kept
 from irb140_jax.errors import InputError
 
 if TYPE_CHECKING:
     from irb140_jax.mismatch import Result
+    from irb140_jax.recordings.conceal import ConcealedCase
+    from irb140_jax.report import Reveal
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,48 +29,50 @@ class Demo:
     """Folder for recordings, diagnosis, report and truth; by default irb140-demo-SEED in the current one."""
 
     def run(self) -> None:
-        from irb140_jax.report.folder import check_folder
-
-        out = self.out or pathlib.Path(f"irb140-demo-{self.seed}")
-        check_folder(out)
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: it has to be 0 or larger")
+        from irb140_jax.report import results_folder
 
-        from irb140_jax.recordings import read_recording, write_recording
+        out = self.out or pathlib.Path(f"irb140-demo-{self.seed}")
+        with results_folder(out, "irb140 demo") as results:
+            self._run(out, results)
+
+    def _run(self, out: pathlib.Path, results) -> None:
         from irb140_jax.recordings.conceal import demo_case
         from irb140_jax.report import print_reveal, revealed
-        from irb140_jax.robot import irb140
 
         with progress() as tell:
             tell("MuJoCo drives an arm with something hidden in it")
             case = demo_case(self.seed)
         terminal = console()
-        terminal.print(
-            f"Something may be hidden in these recordings. SHA-256 of the truth: {case.seal}", soft_wrap=True
-        )
-        robot = irb140()
-
-        def from_files(folder: pathlib.Path) -> "Result":
-            """The diagnosis of the recordings as files, the same that `irb140 diagnose` would make of them."""
-            paths = [folder / "recordings" / f"{recording.source}.csv" for recording in case.recordings]
-            for recording, path in zip(case.recordings, paths, strict=True):
-                write_recording(recording, path)
-            return diagnosed(robot, [read_recording(path, robot) for path in paths])
-
-        result = _write_demo(out, from_files, case.truth, case.seal)
-        show(result, out)
-        print_reveal(revealed(case.truth["effects"], result.diagnosis, case.seal), terminal)
+        said = f"Something may be hidden in these recordings. SHA-256 of the truth: {case.seal}"
+        terminal.print(said, soft_wrap=True)
+        result = _from_files(case, results.desk)
+        reveal = revealed(case.truth["effects"], result.diagnosis, case.seal)
+        folder = results.write(lambda folder: _write(result, reveal, case, results.desk, folder))
+        tell_kept(results)
+        show(result, out if folder == results.folder else folder)
+        print_reveal(reveal, terminal)
 
 
-def _write_demo(out: pathlib.Path, made: Callable[[pathlib.Path], "Result"], truth: dict, seal: str) -> "Result":
-    """Write recordings, diagnosis, report and truth of a demonstration, whole or not at all."""
+def _from_files(case: "ConcealedCase", desk: pathlib.Path) -> "Result":
+    """The diagnosis of the recordings as files, the same that `irb140 diagnose` would make of them."""
+    from irb140_jax.recordings import read_recording, write_recording
+    from irb140_jax.robot import irb140
+
+    paths = [desk / "recordings" / f"{recording.source}.csv" for recording in case.recordings]
+    for recording, path in zip(case.recordings, paths, strict=True):
+        write_recording(recording, path)
+    robot = irb140()
+    return diagnosed(robot, [read_recording(path, robot) for path in paths])
+
+
+def _write(result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path) -> None:
+    """Recordings, diagnosis, report and truth into an empty folder."""
     from irb140_jax.mismatch import save
-    from irb140_jax.report import html_report, revealed, whole_folder
+    from irb140_jax.report import html_report
 
-    with whole_folder(out) as folder:
-        result = made(folder)
-        save(result, folder)
-        reveal = revealed(truth["effects"], result.diagnosis, seal)
-        (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal), encoding="utf-8")
-        (folder / "truth.json").write_text(json.dumps(truth | {"seal": seal}, indent=1) + "\n", encoding="utf-8")
-    return result
+    shutil.copytree(desk, folder, dirs_exist_ok=True)
+    save(result, folder)
+    (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal), encoding="utf-8")
+    (folder / "truth.json").write_text(json.dumps(case.truth | {"seal": case.seal}, indent=1) + "\n", encoding="utf-8")

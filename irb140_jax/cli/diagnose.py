@@ -1,14 +1,13 @@
 """irb140 diagnose."""
 
 import dataclasses
-import math
 import pathlib
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from irb140_jax.cli.options import Columns, Out
-from irb140_jax.cli.shown import console, progress
+from irb140_jax.cli.shown import console, progress, tell_kept
 from irb140_jax.errors import InputError
 
 if TYPE_CHECKING:
@@ -37,24 +36,29 @@ class Diagnose:
     """TOML file that maps other column names and units."""
 
     def run(self) -> None:
-        from irb140_jax.report.folder import check_folder
-
-        check_folder(self.out)
         if not self.recordings:
             raise InputError("diagnose: no recording was named; give at least one: irb140 diagnose REC --out DIR")
-        if not (math.isfinite(self.inertial_uncertainty) and self.inertial_uncertainty > 0):
+        if not 0.0 < self.inertial_uncertainty <= 1.0:  # so that what is no number is refused, too
             raise InputError(
-                f"--inertial-uncertainty {self.inertial_uncertainty}: allowed is a positive share, say 0.05 for 5 %"
+                f"--inertial-uncertainty {self.inertial_uncertainty:g}: allowed is a share above 0 and up to 1, say "
+                "0.05 for 5 %"
             )
+        from irb140_jax.report import results_folder
 
+        inputs = [path for path in (*self.recordings, self.robot, self.columns) if path]
+        with results_folder(self.out, "irb140 diagnose", inputs) as results:
+            result = self._diagnosed()
+            folder = results.write(lambda folder: _write(result, folder))
+            tell_kept(results)
+            show(result, self.out if folder == results.folder else folder)
+
+    def _diagnosed(self) -> "Result":
         from irb140_jax.recordings import read_recording
         from irb140_jax.robot import irb140, load_robot
 
         robot = load_robot(self.robot) if self.robot else irb140()
         recordings = [read_recording(path, robot, columns=self.columns) for path in self.recordings]
-        result = diagnosed(robot, recordings, self.inertial_uncertainty, self._words())
-        _write(result, self.out)
-        show(result, self.out)
+        return diagnosed(robot, recordings, self.inertial_uncertainty, self._words())
 
     def _words(self) -> tuple[str, ...]:
         """Options that name files, as the diagnosis keeps them."""
@@ -73,14 +77,13 @@ def diagnosed(
         return diagnose(robot, recordings, config, tell)
 
 
-def _write(result: "Result", out: pathlib.Path) -> None:
-    """Write diagnosis, model and report, whole or not at all."""
+def _write(result: "Result", folder: pathlib.Path) -> None:
+    """Diagnosis, model and report into an empty folder."""
     from irb140_jax.mismatch import save
-    from irb140_jax.report import html_report, whole_folder
+    from irb140_jax.report import html_report
 
-    with whole_folder(out) as folder:
-        save(result, folder)
-        (folder / "report.html").write_text(html_report(result.diagnosis, result.views), encoding="utf-8")
+    save(result, folder)
+    (folder / "report.html").write_text(html_report(result.diagnosis, result.views), encoding="utf-8")
 
 
 def show(result: "Result", out: pathlib.Path) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from irb140_jax.cli.options import Folder, OutFile
-from irb140_jax.cli.shown import progress
+from irb140_jax.cli.shown import progress, tell_kept
 from irb140_jax.errors import InputError
 
 
@@ -30,14 +30,20 @@ class Excite:
     """Of the search; the same seed gives the same motion."""
 
     def run(self) -> None:
-        from irb140_jax.report.folder import check_file, whole_file
-
-        check_file(self.out)
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: it has to be 0 or larger")
+        from irb140_jax.report import is_our_table, results_file, write_table
 
-        import pandas as pd
+        ours = lambda path: is_our_table(path, ("q.", "qd.", "qdd."))  # noqa: E731
+        with results_file(self.out, ours) as results:
+            table, sentences = self._motion()
+            results.write(lambda folder: write_table(table, folder / results.name))
+            tell_kept(results)
+        print(*sentences, sep="\n")
+        print(f"{self.out}: {len(table['t'])} rows, {self.rate:g} a second")
 
+    def _motion(self) -> tuple[dict, list[str]]:
+        """The motion as columns, and what it decides."""
         from irb140_jax.mismatch import load_model, load_undecided, propose
         from irb140_jax.recordings.excite import motion_columns
         from irb140_jax.report import proposal_sentences
@@ -45,8 +51,4 @@ class Excite:
         robot, open_ = load_model(self.folder).robot, load_undecided(self.folder)
         with progress() as tell:
             proposal = propose(robot, open_, seed=self.seed, duration=self.duration, rate=self.rate, progress=tell)
-        table = pd.DataFrame(motion_columns(proposal.motion, robot.joint_names))
-        with whole_file(self.out) as path:
-            table.to_csv(path, index=False, float_format="%.9g")
-        print(*proposal_sentences(robot, open_, proposal), sep="\n")
-        print(f"{self.out}: {len(table)} rows, {self.rate:g} a second")
+        return motion_columns(proposal.motion, robot.joint_names), proposal_sentences(robot, open_, proposal)

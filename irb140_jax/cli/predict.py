@@ -7,6 +7,9 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from irb140_jax.cli.options import Columns, Folder, OutFile
+from irb140_jax.cli.shown import tell_kept
+
+MODELS = ("nominal", "refit", "corrected")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -17,7 +20,7 @@ class Predict:
     """Folder of a diagnosis."""
 
     recording: Annotated[Positional[pathlib.Path], arg(metavar="REC")]
-    """The recording whose motion is used."""
+    """The recording whose motion is used; it needs no torque."""
 
     out: OutFile
     """CSV file with t, tau_nominal.<joint>, tau_refit.<joint>, tau_corrected.<joint>."""
@@ -26,22 +29,23 @@ class Predict:
     """TOML file that maps other column names and units."""
 
     def run(self) -> None:
-        from irb140_jax.report.folder import check_file, whole_file
+        from irb140_jax.report import is_our_table, results_file, write_table
 
-        check_file(self.out)
+        inputs = [path for path in (self.recording, self.columns) if path]
+        with results_file(self.out, lambda path: is_our_table(path, ("tau_",)), inputs) as results:
+            table = self._table()
+            results.write(lambda folder: write_table(table, folder / results.name))
+            tell_kept(results)
+        print(f"{self.out}: {len(table['t'])} rows")
 
-        import pandas as pd
-
+    def _table(self) -> dict:
         from irb140_jax.mismatch import load_model, predict, prediction_times
         from irb140_jax.recordings import read_recording
 
         model = load_model(self.folder)
-        recording = read_recording(self.recording, model.robot, columns=self.columns)
+        recording = read_recording(self.recording, model.robot, columns=self.columns, torque="optional")
         torque = predict(model, recording)
-        t = prediction_times(recording)
-        table = {"t": t}
-        for name in ("nominal", "refit", "corrected"):
+        table = {"t": prediction_times(recording)}
+        for name in MODELS:
             table |= {f"tau_{name}.{joint}": torque[name][:, i] for i, joint in enumerate(recording.joint_names)}
-        with whole_file(self.out) as path:
-            pd.DataFrame(table).to_csv(path, index=False, float_format="%.9g")
-        print(f"{self.out}: {len(t)} rows")
+        return table

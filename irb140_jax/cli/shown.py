@@ -3,6 +3,10 @@
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from irb140_jax.report import Results
 
 
 def console():
@@ -37,3 +41,9 @@ def progress() -> Iterator[Callable[[str], None]]:
     yield tell
     if len(held) == 1:
         print(held[0], file=sys.stderr, flush=True)
+
+
+def tell_kept(results: "Results") -> None:
+    """Say which files of the user stood in the way, and what they are called now."""
+    for old, new in results.kept:
+        print(f"{old} is not as this command wrote it: kept as {new.name}", file=sys.stderr)

@@ -58,6 +58,7 @@ class Loads(NamedTuple):
     asked: np.ndarray
 
 
+LARGEST = 1e12  # [N m or N] per unit of an amplitude: growth without bound, whose squares would overflow
 STEP = 1e-5  # of the differences behind sensitivities [rad, rad/s, m ...]: errors of 1e-9 beside 1e-10 of rounding
 
 
@@ -184,7 +185,21 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
         motion, run_in = jax.tree.map(piece, whole, per_sample), RUN_IN if start else 0
         effects = np.asarray(_columns(tuple(b[0] for b in lib.blocks), motion, sites, shapes))
         out[start + run_in : start + CHUNK] = effects[run_in : CHUNK - pad]
-    return Columns(along.Y, along.nominal, along.motor_side, out)
+    return Columns(along.Y, along.nominal, along.motor_side, _bounded(lib, out))
+
+
+def _bounded(lib: Library, effects: np.ndarray) -> np.ndarray:
+    """The columns, (T, entries), with those of amplitudes zero that are not finite or beyond `LARGEST` at some joint.
+
+    A spring too soft for the weight on it buckles: along this motion there is no such law, and what moves nothing is
+    never named.
+    """
+    with np.errstate(invalid="ignore"):
+        bad = ~((effects.max(axis=0) < LARGEST) & (effects.min(axis=0) > -LARGEST))
+    if bad.any():
+        amplitudes = lib.entries[1]
+        effects[:, np.isin(amplitudes, amplitudes[bad])] = 0.0
+    return effects
 
 
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.

@@ -18,6 +18,8 @@ POOL = 36  # pieces drawn at first
 ROUNDS, NEAR = 2, 8  # rounds of refinement, and pieces drawn near the chosen ones in each
 HIDDEN_WEIGHT = 0.3  # worth of making one effect testable, beside doubling the odds of a pair
 SPEED_UP = 2.0  # times the speed seen in the recordings: what a robot without speed limits is asked for at most
+LONGEST = 600.0  # [s] that a motion may last; more pieces than are drawn would repeat themselves
+LEAST_RATE, MOST_ROWS = 20.0, 10**6  # [1/s]; a million rows are a table of hundreds of megabytes
 EFFORT_SHARE = 0.8  # of the torque limits that the nominal model may need; what is left out needs some, too
 
 
@@ -59,11 +61,13 @@ def propose(
     Raises:
         InputError: Times that make no motion, or limits that allow none.
     """
-    count = round(duration / (PIECE + 1.0))
-    if count < 1 or rate < 20.0:
+    # Written so that what is no number is refused, too.
+    if not (PIECE + 1.0 <= duration <= LONGEST and LEAST_RATE <= rate and duration * rate <= MOST_ROWS):
         raise InputError(
-            f"excite: {duration:g} s at {rate:g} rows per second; allowed are {PIECE + 1:g} s or more, 20 rows or more"
+            f"excite: {duration:g} s at {rate:g} rows per second; allowed are {PIECE + 1:g} to {LONGEST:g} s, "
+            f"{LEAST_RATE:g} rows per second or more, and {MOST_ROWS} rows in all"
         )
+    count = round(duration / (PIECE + 1.0))
     bounded = within(robot, open_.scales.low, open_.scales.high, SPEED_UP * open_.scales.speed)
     search = _Search(bounded, Questions(robot, open_), np.random.default_rng([seed, 60]))
     progress("drawing pieces of motion")

@@ -98,11 +98,42 @@ def with_prior(G: np.ndarray) -> np.ndarray:
     return G + np.eye(G.shape[-1]) * (1.0 + ROUNDING * np.diagonal(G, axis1=-2, axis2=-1))[..., None]
 
 
+def root(M: np.ndarray) -> np.ndarray:
+    """Lower triangular L with L L' = M, of a Gram matrix with its prior, which has no eigenvalue below 1.
+
+    Where rounding leaves one below zero, as scales of many orders of magnitude can, it counts as 1.
+    """
+    try:
+        return np.linalg.cholesky(M)
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(M)
+        _, R = np.linalg.qr(np.sqrt(np.maximum(values, 1.0))[:, None] * vectors.T)
+        return (R * np.sign(np.diag(R))[:, None]).T
+
+
+def log_determinants(M: np.ndarray) -> np.ndarray:
+    """Log determinants of matrices (count, k, k) that are at least the unit prior.
+
+    Those that rounding took below it are raised to it, in place.
+    """
+    if M.shape[-1] == 1:
+        np.maximum(M, 1.0, out=M)
+        return np.log(M[:, 0, 0])
+    sign, logdet = np.linalg.slogdet(M)
+    short = (sign <= 0.0) | (logdet < 0.0)
+    if short.any():
+        values, vectors = np.linalg.eigh(M[short])
+        values = np.maximum(values, 1.0)
+        M[short] = (vectors * values[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+        logdet[short] = np.log(values).sum(axis=1)
+    return logdet
+
+
 def eliminated(H: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
     """Gram matrix after marginalising some columns (unit prior), and the log determinant that this costs."""
     if len(columns) == 0:
         return H, 0.0
-    chol = linalg.cholesky(with_prior(H[np.ix_(columns, columns)]), lower=True)
+    chol = root(with_prior(H[np.ix_(columns, columns)]))
     half = linalg.solve_triangular(chol, H[columns], lower=True)
     # What is left of a column that these explain but for a trace may be less than it was rounded by.
     return H - half.T @ half + np.diag(ROUNDING * np.diag(H)), 2.0 * float(np.log(np.diag(chol)).sum())
@@ -133,7 +164,7 @@ def posterior(H: np.ndarray, columns: np.ndarray, named: Sequence[slice] = ()) -
     width = np.ones(len(columns))
     for _ in range(WIDENINGS):
         wide = width[:, None] * width
-        cov = wide * linalg.cho_solve(linalg.cho_factor(with_prior(wide * G)), np.eye(len(columns)))
+        cov = wide * linalg.cho_solve((root(with_prior(wide * G)), True), np.eye(len(columns)))
         mean = cov @ b
         last, width = width, np.ones(len(columns))
         for part in named:
@@ -172,7 +203,7 @@ def half_of(H: np.ndarray, columns: np.ndarray, index: np.ndarray) -> np.ndarray
     Returns:
         The half, shape (len(columns), len(index)).
     """
-    chol = np.linalg.cholesky(with_prior(H[np.ix_(columns, columns)]))
+    chol = root(with_prior(H[np.ix_(columns, columns)]))
     return linalg.solve_triangular(chol, H[np.ix_(columns, index)], lower=True, check_finite=False)
 
 
@@ -201,8 +232,8 @@ def gains(
             part = half[:, index]
             M = M - np.einsum("cik,cil->ikl", part, part)
             b = b - np.einsum("cik,c->ik", part, half[:, -1])
+        logdet = log_determinants(M)
         v = np.linalg.solve(M, b[..., None])[..., 0] if k > 1 else b / M[:, 0]
-        logdet = np.linalg.slogdet(M)[1] if k > 1 else np.log(M[:, 0, 0])
         gain[group.which] = 0.5 * np.einsum("ik,ik->i", b, v) - 0.5 * logdet
         mean[group.which, :k] = v
     return gain, mean
@@ -210,5 +241,6 @@ def gains(
 
 def gain_of(H: np.ndarray, columns: np.ndarray) -> float:
     """Log evidence that one group of amplitudes adds."""
-    M, b = with_prior(H[np.ix_(columns, columns)]), H[columns, -1]
-    return 0.5 * float(b @ np.linalg.solve(M, b)) - 0.5 * float(np.linalg.slogdet(M)[1])
+    L = root(with_prior(H[np.ix_(columns, columns)]))
+    v = linalg.solve_triangular(L, H[columns, -1], lower=True)
+    return 0.5 * float(v @ v) - float(np.log(np.diag(L)).sum())

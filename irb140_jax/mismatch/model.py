@@ -13,6 +13,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.along import Columns, Loads, columns_along, prepared, seen_by
 from irb140_jax.mismatch.candidates import Candidate, Library
+from irb140_jax.mismatch.consistent import consistent
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.recordings.condition import Conditioned, condition
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
@@ -56,7 +57,7 @@ def better_known(robot: Robot, phi: np.ndarray, named: Sequence[Named]) -> Robot
     """The robot whose slopes over position and speed shape the effects: refitted inertials, and the springs named.
 
     The load that effects see holds those springs; without them in the slopes, play would be taken out of a link that
-    is softer or stiffer than its load says.
+    is softer or stiffer than its load says.  Links are possible bodies: what swings on a spring has a mass.
 
     Args:
         robot: The nominal model.
@@ -65,7 +66,8 @@ def better_known(robot: Robot, phi: np.ndarray, named: Sequence[Named]) -> Robot
     """
     sprung = as_named(robot, named)
     springs = lambda r: (r.stiffness, r.springref)  # noqa: E731
-    return eqx.tree_at(springs, with_phi(robot, jnp.asarray(phi)), springs(sprung))
+    possible = consistent(phi, np.asarray(robot.phi))
+    return eqx.tree_at(springs, with_phi(robot, jnp.asarray(possible)), springs(sprung))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,0 +1,104 @@
+"""Cases of the testbed: the same for the same seed, of every kind, and true to what they state."""
+
+import numpy as np
+import pytest
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from testbed import cases, probes, rubbing, runner, seeds
+from testbed.arms import built, random_arm
+from testbed.loggers import random_logger
+from testbed.motions import programme
+from testbed.plants import Plant, sizes_of
+
+
+def test_a_case_is_a_function_of_its_draw_and_index():
+    a, b = cases.make("work", 1), cases.make("work", 1)
+    assert a.truth == b.truth and a.xml == b.xml
+    for one, other in zip(a.recordings + a.held_out, b.recordings + b.held_out, strict=True):
+        for name in one:
+            np.testing.assert_array_equal(one[name], other[name])
+
+
+def test_other_draws_and_other_commits_hide_other_things():
+    seeds_of = (("work", ""), ("check", ""), ("final", "a1"), ("final", "b2"))
+    drawn = [[cases.kinds_of(draw, i, commit) for i in range(50)] for draw, commit in seeds_of]
+    assert all(a != b for k, a in enumerate(drawn) for b in drawn[:k])
+
+
+def test_each_pass_of_the_mixture_holds_every_kind():
+    first = [cases.kinds_of("check", i)[0] for i in range(len(cases.PASS))]
+    assert sorted(first) == sorted(cases.PASS) and set(cases.KINDS) <= set(first)
+
+
+@pytest.mark.parametrize(("draw", "commit"), [("final", ""), ("work", "abc"), ("other", "")])
+def test_a_draw_that_nobody_could_repeat_is_refused(draw, commit):
+    with pytest.raises(ValueError, match="final|allowed"):
+        seeds.generator(draw, 0, commit=commit)
+
+
+def small_case(kind, seed=0, ordinary=True):
+    """A kind hidden in an arm of three joints, two short recordings."""
+    rng = np.random.default_rng(seed)
+    nominal = random_arm(rng, 3)
+    motions = programme(nominal, rng, "fourier", 5.0)
+    plant, sizes = Plant(nominal, built(nominal, rng, 0.05)), sizes_of(nominal, motions)
+    if kind:
+        cases.put_in(kind, plant, sizes, rng)
+    if ordinary:
+        rubbing.rubbed(plant, sizes, rng)
+    logger = random_logger(rng, nominal.slide, sizes.tau, rate=250.0)
+    return cases.assembled("work", 0, (kind or "nothing",), plant, sizes, motions, motions[:1], logger, rng, {})
+
+
+@pytest.mark.parametrize("kind", list(cases.KINDS))
+def test_every_kind_changes_the_log_and_states_its_truth_in_the_contracts_words(kind):
+    case, bare = small_case(kind), small_case(None)
+    special = [h for h in case.truth["hidden"] if h["role"] != "ordinary"]
+    assert special and all(np.all(np.isfinite(r[k])) for r in case.recordings for k in r)
+    changed = any(
+        not np.allclose(a[k][: len(b[k])], b[k][: len(a[k])]) for a, b in
+        zip(case.recordings, bare.recordings, strict=True) for k in ("q", "tau_true")
+    )  # fmt: skip
+    assert changed
+    for h in case.truth["hidden"]:
+        assert {*h["accept"], *h["tolerate"]} <= set(CATALOGUE) and (h["slug"] in h["accept"] or h["slug"] is None)
+        if h["slug"] and h["slug"] != "external_wrench":
+            assert set(h["parameters"]) <= {p.name for p in CATALOGUE[h["slug"]].parameters}
+
+
+def test_nothing_hidden_leaves_the_rigid_body():
+    case = small_case(None, ordinary=False)
+    assert case.truth["hidden"] == []
+
+
+def test_ordinary_friction_stands_at_every_joint_but_where_another_law_does():
+    hidden = small_case("stribeck_friction").truth["hidden"]
+    at = [h["joints"][0] for h in hidden if h["slug"] in ("coulomb_friction", "stribeck_friction")]
+    assert sorted(at) == ["j1", "j2", "j3"]
+
+
+def test_friction_on_a_joint_whose_torque_is_scaled_states_no_level():
+    hidden = small_case("two_constants").truth["hidden"]
+    scaled = {h["joints"][0] for h in hidden if h["slug"] == "torque_gain"}
+    for h in hidden:
+        if h["role"] == "ordinary":
+            assert bool(h["parameters"]) == (h["joints"][0] not in scaled)
+
+
+def test_a_body_with_negative_mass_or_a_flat_inertia_is_impossible():
+    assert runner.possible(np.array([2.0, 0.2, 0, 0, 0.1, 0, 0, 0.12, 0, 0.12]))
+    assert not runner.possible(np.array([-0.1, 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.1]))
+    assert not runner.possible(np.array([2.0, 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.5]))
+
+
+def test_noise_below_a_band_is_that_share_of_white_noise():
+    t = np.arange(0.0, 60.0, 0.002)
+    x = np.random.default_rng(0).normal(size=(len(t), 1))
+    assert runner.low_passed(x, t, 25.0).std() == pytest.approx(np.sqrt(0.1), rel=0.1)  # no filter is a brick wall
+
+
+def test_the_files_of_a_probe_can_be_given_more_than_once():
+    assert len(probes.PROBES) >= 11
+    five = probes.PROBES["five_times"][1]()
+    assert len(five.recordings) == 15
+    np.testing.assert_array_equal(five.recordings[12]["tau"], five.recordings[0]["tau"])
