@@ -1,4 +1,5 @@
 """Figures 14 to 17 of the study: tool path, torques and energy of the three models with all seeds, and how far apart."""
+# ruff: noqa: E501  sentences read better whole
 
 import pathlib
 

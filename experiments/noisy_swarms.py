@@ -6,6 +6,7 @@ A candidate's fitness is the torque error along a motion that is driven anew eac
 noise.  A greedy swarm keeps its lucky evaluations; "noise-resilient", "adaptive" and "self-tuning" ones should not.
 Judged without noise on another motion.  Writes noisy_runs.parquet, noisy_swarms.json and .md.
 """
+# ruff: noqa: E501  sentences read better whole
 
 import dataclasses
 import json

@@ -18,10 +18,13 @@ import tempfile
 import time
 from collections.abc import Callable
 
+import embedded_model
+import noisy_swarms
 import study_page
 import table3_swarms
 import table4_control
 import tables_1_2_arm
+import time_per_iteration
 import torque_swarms
 import tracking_swarms
 import tyro
@@ -74,8 +77,11 @@ def steps(config: Config, arm: StudyArm) -> list[Step]:
         ("table 3, figures 6 to 9: swarms on known answers", table3_swarms, ("table3_swarms", "table3_sets"),
          [f"figure{k}.svg" for k in range(6, 10)]),
         ("table 4, figures 14 to 17: sliding mode control", table4_control, ("table4_control",),
-         [f"figure{k}.png" for k in range(14, 18)]),
+         [f"figure{k}.svg" for k in range(14, 18)]),
+        ("time of an iteration", time_per_iteration, ("time_per_iteration",), ()),
         ("beyond: swarms on torque", torque_swarms, ("torque_swarms",), ()),
+        ("beyond: swarms whose every evaluation has new noise", noisy_swarms, ("noisy_swarms",), ()),
+        ("beyond: the model on an embedded controller", embedded_model, ("embedded_model",), ()),
         ("beyond: swarms on tracking, smoothness, energy", tracking_swarms, ("tracking_swarms",),
          ["figure_tracking.svg"]),
     ):  # fmt: skip

@@ -1,4 +1,5 @@
 """What the text leaves open, what we chose, what it changes: the table and its figure, out of stored results."""
+# ruff: noqa: E501  sentences read better whole
 
 import dataclasses
 import math

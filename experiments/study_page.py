@@ -95,7 +95,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         tracking_seen=tracking_report.said_of_seen(tracking),
         network_table=network_table(network) if network else "",
         network_seeds=mlp_report.by_seed(network["cases"]) if network else "",
-        near_singular=mlp_report.near_singular(network["cases"]) if network else "",
+        near_singular=mlp_report.near_singular(network["cases"], network["tests"]) if network else "",
         others=other_arms(folder) if of.is_studys else [],
     )  # fmt: skip
 

@@ -141,7 +141,8 @@ def objective(reading: Reading, arm: StudyArm) -> identify.ParameterDistance:
 
 def all_readings() -> Iterator[Reading]:
     """Every reading that is tried, each once."""
-    return iter(dict.fromkeys(itertools.chain(_pso(), _angles(), _bits(), _penalties(), _others(), _starts(), _thrown(), _choosing())))
+    parts = (_pso(), _angles(), _bits(), _penalties(), _others(), _starts(), _thrown(), _choosing())
+    return iter(dict.fromkeys(itertools.chain(*parts)))
 
 
 def usual_readings() -> Iterator[Reading]:

@@ -264,7 +264,8 @@ def run(config: Config) -> dict:
     np.savez(folder / "shared.npz", t=t, tool=np.asarray(tool))
     return {
         "made": made(config.said()), "config": config.said(), "robot": study.name, "joints": list(arm.joint_names),
-        "motion": task.motion, "gain": np.asarray(task.settings(config)["gain"]).tolist(), "peak_torque": task.peak.tolist(), "readings": readings,
+        "motion": task.motion, "gain": np.asarray(task.settings(config)["gain"]).tolist(),
+        "peak_torque": task.peak.tolist(), "readings": readings,
     }  # fmt: skip
 
 
