@@ -182,6 +182,7 @@ def write_table(config: Config, arm: StudyArm) -> dict:
     kept = set() if earlier is None else set(earlier["reading"]) & set(by_name)
     rows = run(config, arm, [reading for name, reading in by_name.items() if name not in kept])
     rows = [row for row in rows if row["name"] in by_name]
+    kept -= {row["name"] for row in rows}
     choices = readings_of(rows + ([] if earlier is None else _without_runs(earlier, kept, by_name)), earlier)
     pair = pair_of(judged_readings(runs_of(rows), choices))
     boxes = [other for row in pair.values() for other in in_other_boxes(by_name[row["reading"]])]
