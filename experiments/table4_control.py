@@ -71,6 +71,7 @@ class Config(StudyConfig):
         authority: Acceleration that the switching gain stands for [rad/s^2 or m/s^2].
         rotors: Whether rotor inertia counts; the study has none. Default: with other arms than the study's, whose light
             wrists need it.
+        laws: How many of the control's laws are tried, from the first of `LAWS` on; of the study's own arm.
         oracle: Whether to run MuJoCo beside it, one run per model, condition and side.
     """
 
@@ -85,6 +86,7 @@ class Config(StudyConfig):
     layer: float = 0.1
     authority: float = 20.0
     rotors: bool | None = None
+    laws: int = len(LAWS)
     oracle: bool = True
 
 
@@ -252,13 +254,14 @@ def run(config: Config) -> dict:
         readings[name] = {"side": reading[0], "disturbance": reading[1], "law": list(reading[2])}
 
     # Other arms show whether the findings carry over; the text's open choices are the study's own.
-    for law in LAWS if study.is_studys and not config.smoke else LAWS[:1]:
+    whole = study.is_studys and not config.smoke
+    for law in LAWS[: config.laws] if whole else LAWS[:1]:
         for side, kind in itertools.product(SIDES, ("of peak", "of torque")):
             add(" ".join((side, kind, *law)).replace(" ", "_"), config, (side, kind, law))
-    for option, value in SENSITIVITY if study.is_studys and not config.smoke else ():
-        name = f"choice_{option}_{value:g}"
-        add(name, dataclasses.replace(config, **{option: value}, oracle=False), BASE)
-        readings[name]["choice"] = [option, value, getattr(config, option)]
+        for option, value in SENSITIVITY if whole and law == BASE[2] else ():
+            name = f"choice_{option}_{value:g}"
+            add(name, dataclasses.replace(config, **{option: value}, oracle=False), BASE)
+            readings[name]["choice"] = [option, value, getattr(config, option)]
     tool = _tool(arm, task.reference.q[:-1][::THIN])
     t = np.asarray(task.reference.t[:-1][::THIN])
     np.savez(folder / "shared.npz", t=t, tool=np.asarray(tool))
@@ -311,7 +314,8 @@ def _tool(arm: Robot, q: jax.Array) -> jax.Array:
 
 def _mark(config: Config, sets: dict, arm: Robot) -> str:
     """What a stored result depends on, in one number."""
-    digest = hashlib.sha256(repr(config.said()).encode())
+    told = {name: value for name, value in config.said().items() if name != "laws"}
+    digest = hashlib.sha256(repr(told).encode())
     for leaf in jax.tree.leaves((sets, arm)):
         digest.update(np.ascontiguousarray(leaf).tobytes())
     return digest.hexdigest()

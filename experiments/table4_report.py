@@ -159,7 +159,8 @@ def page(result: dict) -> str:
         lines.append(f"| {row['statement']} | {ours(row)} | {said(weakest(row))} | {cells} |")
     lines += ["", "## Figures", "", "Mean and standard deviation over the seeds; `never`: seeds that don't get there."]
     for name, told in table.items():
-        agrees = f"  Joints apart from MuJoCo's by {result['mujoco'][name]:.2g} rad." * (name in result["mujoco"])
+        beside = result["mujoco"].get(name)
+        agrees = "" if beside is None else f"Joints apart from MuJoCo's by {beside:.2g} rad at most."
         lines += ["", f"### {_words(name)}", "", agrees, "", "| quantity | condition | " + " | ".join(MODELS) + " |"]
         lines.append("|---|---|" + "---|" * len(MODELS))
         for quantity, by_condition in told.items():

@@ -98,8 +98,8 @@ def test_a_difference_beyond_luck_is_told_and_chance_is_not(tmp_path):
     rng = np.random.default_rng(0)
     values = {"low": rng.normal(size=30), "high": rng.normal(size=30) + 3.0}
     values["near"] = values["low"] + 1e-3
-    study_provenance.store(pd.DataFrame({"which": np.repeat(list(values), 30), "x": np.concatenate([*values.values()])}),
-                           tmp_path / "runs.parquet")  # fmt: skip
+    frame = pd.DataFrame({"which": np.repeat(list(values), 30), "x": np.concatenate([*values.values()])})
+    study_provenance.store(frame, tmp_path / "runs.parquet")
     pairs = (("low", "high"), ("high", "low"), ("low", "near"))
     tests = [study_statistics.Test("control", "", "runs.parquet", "x", *((("which", w),) for w in p)) for p in pairs]
     assert [row["lower"] for row in study_statistics.tested(tests, tmp_path)] == ["first", "second", "neither"]
