@@ -146,7 +146,7 @@ def table(choices: list[Choice]) -> str:
     return "\n".join(lines + [f"| {c.open} | {c.chosen} | {c.tried} | {c.changes} |" for c in choices])
 
 
-def figure(choices: list[Choice], path: pathlib.Path) -> pathlib.Path:
+def figure(choices: list[Choice], path: pathlib.Path, is_studys: bool) -> pathlib.Path:
     """Spans of both kinds, what was published beside those of the swarms."""
     kinds = [[c for c in choices if c.control == control] for control in (False, True)]
     figure, axes = plt.subplots(1, 2, figsize=(12.5, 0.36 * max(map(len, kinds)) + 1.2))
@@ -159,7 +159,7 @@ def figure(choices: list[Choice], path: pathlib.Path) -> pathlib.Path:
         ax.set_yticks(range(len(kind)), [c.open.split(":")[0].split(" (")[0] for c in kind[::-1]], fontsize=8)
         ax.set(xscale="log", xlabel=label)
         ax.grid(axis="x", which="both", alpha=0.25)
-    for value, name in ((2.94, "PSO"), (0.43, "QPSO")):
+    for value, name in ((2.94, "PSO"), (0.43, "QPSO")) if is_studys else ():
         axes[0].axvline(value, color=COLOURS[name], ls=":", lw=1.2)
     handles = {k: h for ax in axes for h, k in zip(*ax.get_legend_handles_labels(), strict=True)}
     axes[1].legend(handles.values(), handles.keys(), frameon=False, fontsize=8)

@@ -44,7 +44,7 @@ def write(config: StudyConfig, arm: StudyArm) -> pathlib.Path:
     path = config.page_path(arm)
     folder, figures = config.folder(arm), config.figure_folder(arm)
     choices = choices_of(folder)
-    study_choices.figure(choices, figures / "figure_choices.svg")
+    study_choices.figure(choices, figures / "figure_choices.svg", arm.is_studys)
     text = page(folder, os.path.relpath(figures, path.parent), arm, choices)
     path.write_text(text, encoding="utf-8")
     return path
@@ -71,7 +71,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
     network, time, noisy, embedded = map(perhaps, ("mlp_kinematics", "time_per_iteration", "noisy_swarms", "embedded_model"))
     told = readings_in(folder)
     sections = {
-        "Identification by swarms": swarm_claims(t3, told, sets, time),
+        "Identification by swarms": swarm_claims(t3, told, sets, time, of.is_studys),
         "Control with the identified models": control_claims(t4),
         "The arm and its reference values": arm_claims(arm) + (network_claims(network) if network else []),
         "What the study leaves to the future": beyond_claims(torque, tracking, noisy, embedded),
@@ -90,7 +90,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         seeds=len(sets["sets"]["PSO"]), parameters=parameters(sets), table4=table4(t4), choices=study_choices.table(choices),
         walls=walls(sets), families=FAMILIES, alpha=ALPHA, shown=t4["shown"].replace("_", " "), tracking=tracking, span=lambda x: f"{x[0]:.3g} to {x[1]:.3g}" if x[0] != x[1] else f"{x[0]:.3g}",
         noisy_table=noisy_swarms.table(noisy) if noisy else "", embedded=embedded, made=provenance(folder),
-        share=f"{100 * t4['config']['share']:.0f}", mujoco=max(t4["mujoco"].values()), table5=table5(t3, t4),
+        share=f"{100 * t4['config']['share']:.0f}", mujoco=max(t4["mujoco"].values()), table5=table5(t3, t4, of.is_studys),
         torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking),
         tracking_seen=tracking_report.said_of_seen(tracking),
         network_table=network_table(network) if network else "",
@@ -212,7 +212,7 @@ def table4(t4: dict) -> list[dict]:
     return rows
 
 
-def table5(t3: dict, t4: dict) -> list[dict]:
+def table5(t3: dict, t4: dict, is_studys: bool) -> list[dict]:
     """Table 5: every dimension of the comparison, published words beside ours."""
     words = {
         "com": ("error of the centres of mass, %", "QPSO better: 0.43 against 2.94"), "inertia": ("error of the inertias, %", "QPSO better: 0.76 against 4.66"),
@@ -221,6 +221,7 @@ def table5(t3: dict, t4: dict) -> list[dict]:
     rows = []
     for test in t3["tests"]:
         name, published = words[test["column"]]
+        published = published if is_studys else published.split(":")[0].replace(" (27)", "")
         first = "PSO" if test["column"] == "plateau" else "QPSO"
         rows.append(_of_test(test, name, published, first, first == "PSO", [f"{x:.3g}" for x in test["medians"]]))
     shown = {

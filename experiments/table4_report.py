@@ -93,7 +93,8 @@ def summary(told: pd.DataFrame) -> dict:
 def spread(x: np.ndarray) -> dict:
     """Mean and standard deviation over the seeds that have a finite value, and how many have not."""
     finite = x[np.isfinite(x)]
-    mean, std = (float(finite.mean()), float(finite.std(ddof=1))) if finite.size > 1 else (None, None)
+    mean = float(finite.mean()) if finite.size > 1 else None
+    std = None if mean is None else float(finite.std(ddof=1)) if np.ptp(finite) > 0.0 else 0.0
     return {"mean": mean, "std": std, "never": int(x.size - finite.size)}
 
 
