@@ -3,7 +3,8 @@
     python experiments/recompute_study.py [results]
 
 Knows nothing of irb140_jax and of the other scripts: it reads the Parquet files, computes means, spreads,
-Mann-Whitney's p and Holm's correction itself, and compares them with what the JSON files state.  Exit code 1 where one differs.
+Mann-Whitney's p and Holm's correction itself, and compares them with what the JSON files state.  Exit code 1
+where one differs.
 """
 
 import json

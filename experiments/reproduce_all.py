@@ -2,6 +2,7 @@
 
     python experiments/reproduce_all.py                               # the study's arm; half an hour on one core
     python experiments/reproduce_all.py --robot arm.xml [--joints n]  # the same tables for any other arm
+    python experiments/reproduce_all.py --robot arm.xml --quick       # without the searches by the closed loop
     python experiments/reproduce_all.py --smoke                       # all steps as small as can be, in a new folder
 
 A step whose result is there for the same choices is left out (--again runs it nevertheless); an interrupted step goes
@@ -39,9 +40,11 @@ class Config(StudyConfig):
 
     Attributes:
         again: Run every step, whether its result is there or not.
+        quick: Leave out the searches by the closed loop, which take most of the time; the page says so.
     """
 
     again: bool = False
+    quick: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,6 +92,8 @@ def steps(config: Config, arm: StudyArm) -> list[Step]:
         own = module.Config(**shared)
         so_far += f" {title} {own.said()}"
         found.append(Step(title, lambda m=module, c=own: m.main(c), outputs, so_far))
+    if config.quick:
+        found = [step for step in found if "tracking" not in step.title]
     network = pathlib.Path(__file__).with_name("mlp_kinematics.py")
     # The network learns the IRB 140's own kinematics, whatever the arm; it has a smoke run of its own.
     if network.is_file() and arm.is_studys and not config.smoke:

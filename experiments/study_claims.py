@@ -360,26 +360,22 @@ def _penalised(network: dict) -> Claim:
     )
 
 
-def beyond_claims(torque: dict, tracking: dict, noisy: dict | None, embedded: dict | None) -> list[Claim]:
+def beyond_claims(torque: dict, tracking: dict | None, noisy: dict | None, embedded: dict | None) -> list[Claim]:
     """What the study leaves to future research: data instead of known answers."""
     by = {row["name"]: row for row in torque["rows"]}
     swarms = [r for r in torque["rows"] if "PSO" in r["name"]]
     best = min(swarms, key=lambda r: r["held_out_median"])
     prior = by["Levenberg-Marquardt, box as prior"]
+    more = ([_noisy(noisy)] if noisy else []) + ([_embedded(embedded)] if embedded else [])
+    found = [_torque(torque, swarms, best, prior)]
+    if tracking is None:
+        return found + more
     seen, truth = tracking["seen"], tracking["truth"]
     rows = [r for r in tracking["rows"] if r["algorithm"]]
     tracked = [r for r in rows if r["objective"] == "tracking"]
     cheaper = [r for r in rows if r["objective"] in truth and r["objective"] != "tracking"]
     below = [r for r in cheaper if r["measures"][r["objective"]] < truth[r["objective"]]]
-    found = [
-        Claim(
-            "swarms identify the parameters (with torque instead of known answers)",
-            f"held-out torque error, median of the runs: best swarm {best['held_out_median']:.2g} N m in {best['run_s']:.2g} s, Levenberg-Marquardt "
-            f"that is told the same box {prior['held_out_median']:.2g} N m in {prior['run_s']:.2g} s; parameters off by "
-            f"{min(r['inertia'] for r in swarms):.0f} % or more of the inertias all the same",
-            f"noise {torque['bounds']['noise']:.2g} N m, middle of the box {torque['bounds']['middle of the box']:.2g} N m",
-            FAILS, "torque shows base parameters only; what predicts well need not be the parameters",
-        ),
+    found += [
         Claim(
             "tracking performance can take the place of known answers (future research)",
             f"tracking alone leaves the centres of mass off by {min(r['com'] for r in tracked):.0f} %, the inertias by "
@@ -398,7 +394,19 @@ def beyond_claims(torque: dict, tracking: dict, noisy: dict | None, embedded: di
             f"true model: roughness {truth['smoothness']:.4g} N m/s, energy {truth['energy']:.4g} J",
             FAILS if below else OPEN, "the smoothest or cheapest motion is not the one under the true model",
         ))  # fmt: skip
-    return found + ([_noisy(noisy)] if noisy else []) + ([_embedded(embedded)] if embedded else [])
+    return found + more
+
+
+def _torque(torque: dict, swarms: list[dict], best: dict, prior: dict) -> Claim:
+    """Data in place of known answers."""
+    return Claim(
+        "swarms identify the parameters (with torque instead of known answers)",
+        f"held-out torque error, median of the runs: best swarm {best['held_out_median']:.2g} N m in {best['run_s']:.2g} s, Levenberg-Marquardt "
+        f"that is told the same box {prior['held_out_median']:.2g} N m in {prior['run_s']:.2g} s; parameters off by "
+        f"{min(r['inertia'] for r in swarms):.0f} % or more of the inertias all the same",
+        f"noise {torque['bounds']['noise']:.2g} N m, middle of the box {torque['bounds']['middle of the box']:.2g} N m",
+        FAILS, "torque shows base parameters only; what predicts well need not be the parameters",
+    )  # fmt: skip
 
 
 def _noisy(noisy: dict) -> Claim:

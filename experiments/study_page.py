@@ -67,7 +67,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
     load = lambda name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))  # noqa: E731
     perhaps = lambda name: load(name) if (folder / f"{name}.json").is_file() else None  # noqa: E731
     arm, t3, sets, t4 = (load(n) for n in ("tables_1_2", "table3_swarms", "table3_sets", "table4_control"))
-    torque, tracking = load("torque_swarms"), load("tracking_swarms")
+    torque, tracking = load("torque_swarms"), perhaps("tracking_swarms")
     network, time, noisy, embedded = map(perhaps, ("mlp_kinematics", "time_per_iteration", "noisy_swarms", "embedded_model"))
     told = readings_in(folder)
     sections = {
@@ -91,8 +91,8 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         walls=walls(sets), families=FAMILIES, alpha=ALPHA, shown=t4["shown"].replace("_", " "), tracking=tracking, span=lambda x: f"{x[0]:.3g} to {x[1]:.3g}" if x[0] != x[1] else f"{x[0]:.3g}",
         noisy_table=noisy_swarms.table(noisy) if noisy else "", embedded=embedded, made=provenance(folder),
         share=f"{100 * t4['config']['share']:.0f}", mujoco=max(t4["mujoco"].values()), table5=table5(t3, t4, of.is_studys),
-        torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking),
-        tracking_seen=tracking_report.said_of_seen(tracking),
+        torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking) if tracking else "",
+        tracking_seen=tracking_report.said_of_seen(tracking) if tracking else "",
         network_table=network_table(network) if network else "",
         network_seeds=mlp_report.by_seed(network["cases"]) if network else "",
         near_singular=mlp_report.near_singular(network["cases"], network["tests"]) if network else "",
@@ -114,12 +114,16 @@ def other_arms(folder: pathlib.Path) -> list[dict[str, str]]:
     return found
 
 
-def in_short(t3: dict, t4: dict, torque: dict, tracking: dict, is_studys: bool) -> list[str]:
+def in_short(t3: dict, t4: dict, torque: dict, tracking: dict | None, is_studys: bool) -> list[str]:
     """The findings that a reader should leave with."""
     pso, qpso = t3["nearest_pair"]["pso"], t3["nearest_pair"]["qpso"]
     by = {r["name"]: r for r in torque["rows"]}
     swarm = min((r for r in torque["rows"] if "PSO" in r["name"]), key=lambda r: r["held_out_median"])
-    told, seen = by["Levenberg-Marquardt, box as prior"], tracking["seen"]
+    told, seen = by["Levenberg-Marquardt, box as prior"], tracking["seen"] if tracking else None
+    shows = "" if seen is None else (
+        f" Only {seen['torque']['rank']} combinations of the {len(seen['names'])} unknowns show in a motion at all; tracking, "
+        "smoothness and energy show no more."
+    )
     published = "; published: 2.94 / 4.66 and 0.43 / 0.76 %" if is_studys else ""
     literal = {f: t3["literal"][f] for f in ("pso", "qpso")}
     found = []
@@ -139,9 +143,7 @@ def in_short(t3: dict, t4: dict, torque: dict, tracking: dict, is_studys: bool) 
         tool_in_short(t4, is_studys),
         f"**With data a swarm buys little.** On torque with noise, the best swarm's median run predicts unseen torque to "
         f"{swarm['held_out_median']:.2g} N m, Levenberg-Marquardt that is told the same box to "
-        f"{told['held_out_median']:.2g} N m in {told['run_s'] / swarm['run_s']:.1g} of the time. Only "
-        f"{seen['torque']['rank']} combinations of the {len(seen['names'])} unknowns show in a motion at all; tracking, "
-        "smoothness and energy show no more.",
+        f"{told['held_out_median']:.2g} N m in {told['run_s'] / swarm['run_s']:.1g} of the time." + shows,
     ]
     return found
 
