@@ -12,6 +12,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 import pandas as pd  # noqa: E402
+from study_readings import Reading  # noqa: E402
 
 TOOL = "tracking error of the tool [mm]"
 COLOURS = {"reference": "0.35", "PSO": "tab:red", "QPSO": "tab:blue"}
@@ -54,40 +55,52 @@ OPEN = {
     "inertia_weight": ("inertia weight: 0.99 (section 3) or falling (equation 18)", ()),
     "units": ("units of equation 20", ()),
     "walls": ("whether particles stop at the bounds", ()),
-    "penalty": ("weight of equation 20's penalty", ("walls", "place", "velocity_limit")),
+    "penalty": ("weight of equation 20's penalty", ()),
     "start_speed": ("Algorithm 1's random first velocities", ()),
     "decode": ("from angles or bits to parameters", ("perturbed", "collapse")),
     "perturbed": ("Algorithm 2's perturbation", ()),
-    "perturbation": ("its size [rad]", ("perturbed",)),
+    "perturbation": ("size of Algorithm 2's perturbation [rad]", ("perturbed",)),
 }
-CHOSEN = {
-    "width": "50 % of the reference", "place": "anywhere, drawn once", "box": "draw 0", "units": "each by its reference",
-    "penalty": "t/T", "start_speed": "none", "decode": "D1, the amplitude", "perturbation": "0.05; not in the pair",
-}  # fmt: skip
+# A penalty matters only where particles may leave the box.
+FREE = Reading("pso", velocity_limit=0.1, walls=False)
+# Where the nearest pair's own neighbours were not run, these two are the ones that change.
+PLAIN = {"pso": Reading("pso", velocity_limit=0.2, place="anywhere"),
+         "qpso": Reading("qpso", velocity_limit=0.02, perturbed=False, place="anywhere")}  # fmt: skip
 
 
 def swarm_choices(told: pd.DataFrame, pair: dict[str, dict]) -> list[Choice]:
     """Each choice changed alone, from the nearest pair of readings."""
-    rows = {f: told[told["reading"] == row["name"]].iloc[0] for f, row in pair.items()}
+    by_name = told.set_index("reading", drop=False)
+    rows = {f: by_name.loc[row["name"]] for f, row in pair.items()}
+    plain = {f: by_name.loc[str(reading)] for f, reading in PLAIN.items() if str(reading) in by_name.index}
     found = []
     for attribute, (words, along) in OPEN.items():
         spans, tried = {}, set()
         for family, base in rows.items():
-            same = told["algorithm"] == base["algorithm"]
-            for other in OPEN.keys() - {attribute, *along}:
-                same &= told[other] == base[other]
-            alike = told[same]
-            if alike[attribute].nunique() > 1:
+            alike = _alike(told, base, attribute, along)
+            if len(alike) < 2 and family in plain:
+                alike = _alike(told, plain[family], attribute, along)
+            if len(alike) < 2 and family == "pso" and str(FREE) in by_name.index:
+                alike = _alike(told, by_name.loc[str(FREE)], attribute, along)
+            if len(alike) > 1:
                 spans[family.upper()] = (float(alike["com"].min()), float(alike["com"].max()))
                 tried |= set(alike[attribute])
         if spans:
-            chosen = CHOSEN.get(attribute) or " and ".join(f"{_said(r[attribute])} ({f.upper()})" for f, r in rows.items())
-            if len({r[attribute] for r in rows.values()}) == 1 and attribute not in CHOSEN:
-                chosen = _said(next(iter(rows.values()))[attribute])
+            taken = {f.upper(): _said(r[attribute]) for f, r in rows.items() if f.upper() in spans}
+            both = " and ".join(f"{value} ({f})" for f, value in taken.items())
+            chosen = next(iter(taken.values())) if len(set(taken.values())) == 1 else both
             found.append(Choice(words, chosen, ", ".join(map(_said, sorted(tried))), spans, False))
     spans = {f.upper(): tuple(sorted((r["averaged_com"], r["com"]))) for f, r in rows.items()}
     averaged = Choice("MAPE of each run, or of the averaged set of 30 runs", "of each run, then the mean", "both", spans, False)
     return [*found, averaged]
+
+
+def _alike(told: pd.DataFrame, base: pd.Series, attribute: str, along: tuple[str, ...]) -> pd.DataFrame:
+    """Readings that differ from the base in nothing but this; none unless it takes two values."""
+    same = told["algorithm"] == base["algorithm"]
+    for other in OPEN.keys() - {attribute, *along}:
+        same &= told[other] == base[other]
+    return told[same] if told.loc[same, attribute].nunique() > 1 else told[:0]
 
 
 def _said(value) -> str:
@@ -95,7 +108,7 @@ def _said(value) -> str:
         return "yes" if value else "no"
     if isinstance(value, (int, float, np.number)):
         return "none" if math.isinf(value) else f"{value:g}"
-    return str(value)
+    return str(value).removeprefix("w ")
 
 
 CONTROL_OPEN = {
