@@ -9,6 +9,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
 
 MODELS = ("reference", "PSO", "QPSO")
 CONDITIONS = ("nominal", "disturbed")
@@ -18,7 +19,6 @@ STYLES = (
     {"color": "tab:red", "linewidth": 1.0},
     {"color": "tab:blue", "linewidth": 1.0, "linestyle": (0, (4, 2))},
 )
-Axes = matplotlib.axes.Axes
 matplotlib.rcParams["svg.hashsalt"] = "irb140"
 
 

@@ -10,6 +10,7 @@ Judged without noise on another motion.  Writes noisy_runs.parquet, noisy_swarms
 
 import dataclasses
 import json
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -90,7 +91,7 @@ def run(config: Config, study: StudyArm) -> pd.DataFrame:
     place = jnp.asarray(np.flatnonzero(study.searched))
     where = jnp.asarray(np.random.default_rng(0).uniform(size=study.x.shape))
     lower, upper = (end[place] for end in identify.box(study.x, config.width, place=where))
-    size = {"particles": 12, "iterations": 10} if config.smoke else {}
+    size: dict[str, Any] = {"particles": 12, "iterations": 10} if config.smoke else {}
     clean = recorded(robot, config.duration, 0.0, seed=1)
     fit = identify.linear_fit(robot, links, clean)
     unseen = identify.linear_fit(robot, links, recorded(robot, config.duration, 0.0, seed=2))

@@ -6,6 +6,9 @@ Knows nothing of irb140_jax and of the other scripts: it reads the Parquet files
 Mann-Whitney's p and Holm's correction itself, and compares them with what the JSON files state.  Exit code 1
 where one differs.
 """
+# pandas types every column as all that it might be.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
 
 import json
 import math

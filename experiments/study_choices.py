@@ -1,4 +1,7 @@
 """What the text leaves open, what we chose, what it changes: the table and its figure, out of stored results."""
+# pandas types every column as all that it might be.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
 # ruff: noqa: E501  sentences read better whole
 
 import dataclasses

@@ -1,4 +1,7 @@
 """Where a result comes from: commit, versions, machine, options; stored with every result of the study."""
+# pandas types every column as all that it might be.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
 
 import datetime
 import importlib.metadata

@@ -1,4 +1,7 @@
 """Table 3 out of what table3_swarms.py stored: which readings come nearest, tests, the table; runs no swarm."""
+# pandas types every column as all that it might be.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
 # ruff: noqa: E501  sentences read better whole
 
 import itertools
@@ -161,7 +164,9 @@ def short(row: dict) -> dict:
     """What is told of a reading."""
     keys = ("com", "com_sd", "inertia", "inertia_sd", "averaged_com", "averaged_inertia", "fitness", "fitness_sd",
             "plateau", "plateau_of_mean", "at_wall", "possible", "outliers")  # fmt: skip
-    return {"name": row["reading"]} | {key: float(f"{row[key]:.5g}") for key in keys}
+    # What is not known of a reading without single runs is left empty.
+    told = {key: float(f"{row[key]:.5g}") if math.isfinite(row[key]) else None for key in keys}
+    return {"name": row["reading"]} | told
 
 
 def page(result: dict) -> str:

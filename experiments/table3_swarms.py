@@ -9,6 +9,9 @@ Readings are appended to table3_swarms.jsonl as they are done, so an interrupted
 table3_runs.parquet (one row a run) and table3_readings.parquet (one row a reading), the table (table3_swarms.json and
 .md), the sets of the nearest pair of readings (table3_sets.json), and the figures of these.
 """
+# pandas types every column as all that it might be.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
 
 import dataclasses
 import itertools

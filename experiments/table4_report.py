@@ -1,4 +1,7 @@
 """Table 4 and figures 14 to 17 out of what table4_control.py stored; computes no motion."""
+# pandas types every column as all that it might be.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
 
 import json
 import pathlib
