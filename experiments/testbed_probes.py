@@ -3,7 +3,8 @@
     python experiments/testbed_probes.py                  # all
     python experiments/testbed_probes.py lugre spring     # these
 
-One row a probe; what each hides is in `testbed/probes.py`, and every figure is `testbed/scoring.py`'s.
+What each probe hides is in `testbed/probes.py`, and every figure is `testbed/scoring.py`'s.  Results are kept in
+results/testbed_probes.jsonl, each in the place of its former one.
 """
 
 import json
@@ -54,6 +55,13 @@ def row(line: dict[str, Any]) -> str:
     return "\n    ".join([*parts, f"{line['seconds']:.1f} s"])
 
 
+def keep(name: str, line: dict[str, Any]) -> None:
+    """Store a probe's result in the place of its former one."""
+    path = runner.RESULTS / "testbed_probes.jsonl"
+    kept = {r["probe"]: r for r in runner.read(path)} | {name: {"probe": name} | line}
+    path.write_text("".join(json.dumps(kept[n]) + "\n" for n in PROBES if n in kept), encoding="utf-8")
+
+
 def main() -> None:
     from irb140_jax.compilation_cache import set_up_compilation_cache
 
@@ -61,6 +69,7 @@ def main() -> None:
     for name in sys.argv[1:] or PROBES:
         sentence, make = PROBES[name]
         line = json.loads(json.dumps(runner.compact(runner.judged(make()))))
+        keep(name, line)
         print(f"{name}: {sentence}\n    {row(line)}", flush=True)
 
 

@@ -85,20 +85,37 @@ def kinds_of(draw: str, index: int, commit: str = "") -> tuple[str, ...]:
     return (first,) if {first, second} == two_masses else (first, second)
 
 
-def make(draw: str, index: int, commit: str = "") -> Case:
+@dataclasses.dataclass(frozen=True)
+class Variation:
+    """The same case under other conditions, for sweeps.
+
+    Attributes:
+        noise: Factor on the noise and the steps of the sensors.
+        longer: Factor on the length of the recordings.
+        error: True relative error of the inertials in place of the one that was drawn.
+    """
+
+    noise: float = 1.0
+    longer: float = 1.0
+    error: float | None = None
+
+
+def make(draw: str, index: int, commit: str = "", vary: Variation = Variation()) -> Case:  # noqa: B008
     """A case: a pure function of its draw and its index.
 
     Args:
         draw: "work", "check" or "final".
         index: 0, 1, 2, ...
         commit: Seeds "final".
+        vary: Conditions other than those drawn.
     """
-    rng = generator(draw, index, "plant", commit)
+    rng, moving, logging = (generator(draw, index, stream, commit) for stream in ("plant", "motions", "logger"))
     kinds = kinds_of(draw, index, commit)
     nominal = irb140() if rng.random() < 0.4 else random_arm(rng, int(rng.integers(2, 8)))
-    error = float(rng.choice(ERRORS))
-    name, seconds = str(rng.choice(list(PROGRAMMES), p=(0.2, 0.5, 0.15, 0.15))), rng.uniform(*SECONDS)
-    motions = programme(nominal, rng, name, seconds)
+    drawn, name = float(rng.choice(ERRORS)), str(rng.choice(list(PROGRAMMES), p=(0.2, 0.5, 0.15, 0.15)))
+    error = drawn if vary.error is None else vary.error
+    unseen = [dataclasses.replace(m, number=100) for m in programme(nominal, moving, "fourier", 8.0)[:1]]
+    motions = programme(nominal, moving, name, moving.uniform(*SECONDS) * vary.longer)
     plant, sizes = Plant(nominal, built(nominal, rng, error)), sizes_of(nominal, motions)
     strength = {}
     for kind in kinds:
@@ -106,10 +123,10 @@ def make(draw: str, index: int, commit: str = "") -> Case:
             strength[kind] = put_in(kind, plant, sizes, rng)
     if kinds != ("nothing",) and (kinds[0] == "ordinary" or rng.random() < 0.9):
         rubbing.rubbed(plant, sizes, rng)
-    logger = random_logger(rng, nominal.slide, sizes.tau)
-    unseen = [dataclasses.replace(m, number=100) for m in programme(nominal, rng, "fourier", 8.0)[:1]]
+    logger = random_logger(logging, nominal.slide, sizes.tau)
+    logger = dataclasses.replace(logger, noise=vary.noise * logger.noise, steps=vary.noise * logger.steps)
     setting = {"inertial_error": error, "stated_error": STATED, "programme": name, "strength": strength}
-    return assembled(draw, index, kinds, plant, sizes, motions, unseen, logger, rng, setting)
+    return assembled(draw, index, kinds, plant, sizes, motions, unseen, logger, logging, setting)
 
 
 def put_in(kind: str, plant: Plant, sizes: Sizes, rng: np.random.Generator) -> float:

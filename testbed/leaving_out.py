@@ -19,9 +19,9 @@ def rotor(plant: Plant, sizes: Sizes, rng: np.random.Generator, j: int, torque: 
 
 
 def offset(plant, sizes, rng, j, torque):
-    """A torque of the drive that settles from 4 % more in ten seconds."""
+    """A torque of the drive that settles from 2 % more in ten seconds."""
     sign = rng.choice([-1.0, 1.0])
-    plant.laws.append(on(j, lambda m, load: sign * torque * (1.0 + 0.04 * np.exp(-m.t / 10.0))))
+    plant.laws.append(on(j, lambda m, load: sign * torque * (1.0 + 0.02 * np.exp(-m.t / 10.0))))
     hide(plant, "drive offset", "torque_offset", j, {"offset": sign * torque}, accept=("asymmetric_friction",))
 
 
@@ -106,7 +106,7 @@ def coupling(plant, sizes, rng, j, torque):
     slope = torque / both
 
     def law(m, load):
-        rub = slope * 3.0 * both * np.arcsinh((m.qd[:, j] + way * m.qd[:, other]) / (3.0 * both))
+        rub = slope * 6.0 * both * np.arcsinh((m.qd[:, j] + way * m.qd[:, other]) / (6.0 * both))
         tau = np.zeros_like(m.q)
         tau[:, j], tau[:, other] = rub, way * rub
         return tau
@@ -173,7 +173,7 @@ def lag(plant, sizes, rng, j, torque):
         return tau
 
     plant.drives.append(drive)
-    hide(plant, "lead-lag drive", "actuator_lag", j, {"time_constant": time})
+    hide(plant, "lead-lag drive", "actuator_lag", j, {"time_constant": 0.9 * time})  # slow torques are late by that
 
 
 def delay(plant, sizes, rng, j, torque):

@@ -9,13 +9,13 @@ from testbed import friction
 from testbed.motions import STEP
 from testbed.plants import Hidden, Plant, Sizes, on
 
-STILL = 0.01  # of a joint's usual speed, within which dry friction without a step changes its sign
+STILL = 0.003  # of a joint's usual speed, within which dry friction without a step changes its sign
 ORDINARY = ("coulomb_friction", "viscous_friction")
 
 
 def coulomb(plant: Plant, sizes: Sizes, rng: np.random.Generator, j: int, torque: float, role: str = "special"):
     """Dry friction with a smooth turn."""
-    still, form = STILL * sizes.qd[j] * rng.uniform(0.3, 1.0), str(rng.choice(["root", "arc"]))
+    still, form = sizes.qd[j] * 10.0 ** rng.uniform(-3.0, -2.0), str(rng.choice(["root", "arc"]))
     plant.laws.append(on(j, lambda m, load: friction.dry(m.qd[:, j], torque, still, form)))
     hide(plant, "coulomb", "coulomb_friction", j, {"coulomb": torque}, role=role)
 

@@ -5,7 +5,8 @@
     python -m testbed.runner final --commit HASH
 
 One JSON line a case is appended to results/testbed_DRAW.jsonl as it is done, so an interrupted run goes on where it
-stopped; `--label` names another engine's file.  A diagnosis goes the way of a user's: a file of the model and files of
+stopped; `--label` names the file of another engine, or of other conditions (--noise 0.1 --longer 10, --error 0.3).  A
+diagnosis goes the way of a user's: a file of the model and files of
 the recordings are written, read, checked and diagnosed.
 """
 
@@ -20,7 +21,7 @@ import numpy as np
 import tyro
 from scipy import signal
 
-from testbed.cases import Case, make
+from testbed.cases import Case, Variation, make
 
 RESULTS = pathlib.Path(__file__).parents[1] / "results"
 KEPT = ("verdict", "findings", "unexplained", "not_testable", "fit", "notes", "summary")
@@ -36,7 +37,12 @@ class Config:
     commit: str = ""
     """Hash that seeds "final"."""
     label: str = ""
-    """Of another engine: results/testbed_DRAW_LABEL.jsonl."""
+    """Of another engine or other conditions: results/testbed_DRAW_LABEL.jsonl."""
+    noise: float = 1.0
+    longer: float = 1.0
+    error: float | None = None
+    engine: str = ""
+    """Commit of the package that diagnoses, kept with each result."""
     out: pathlib.Path = RESULTS
     until: str = ""
     """Begin no case after this time of day, HH:MM."""
@@ -162,7 +168,8 @@ def main() -> None:
             break
         if index in done:
             continue
-        out = judged(make(config.draw, index, config.commit))
+        vary = Variation(config.noise, config.longer, config.error)
+        out = {**judged(make(config.draw, index, config.commit, vary)), "engine": config.engine}
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(compact(out)) + "\n")
         said = out["diagnosis"]["verdict"] if out["diagnosis"] else out.get("refused") or out["failed"]

@@ -11,6 +11,8 @@ from testbed.rubbing import ORDINARY
 # These act on all joints, so that their list of joints decides nothing.
 EVERYWHERE = ("time_delay", "gravity_tilt", "payload", "contact", "external_wrench")
 GAIN_WITHIN = 0.05
+# What a note has to speak of besides the joint, so that a repaired sample is no statement about a dead channel.
+OF_THE_LOG = re.compile(r"dead|froz|constant|zero|stuck|differ|between recordings|late|delay|saturat", re.IGNORECASE)
 NOT_A_BODY = re.compile(r"(?:mass|Ixx|Iyy|Izz)[^,;]*? (?:->|to|is|of) -\d[\d.e+-]* kg")
 
 
@@ -105,7 +107,7 @@ def located(line: dict[str, Any]) -> list[tuple[str, str]]:
         if not h["unnamed"]:
             continue
         how, joints = "not said", set(h["joints"])
-        if any(j in note for note in said.get("notes", []) for j in joints if len(joints) == 1):
+        if len(joints) == 1 and any(h["joints"][0] in x and OF_THE_LOG.search(x) for x in said.get("notes", [])):
             how = "noted"
         if any(matches(f, h, ("accept",)) for f in said["findings"]):
             how = "named alike"

@@ -88,12 +88,13 @@ def example_diagnosis() -> dict:
 
 
 def example_views() -> dict:
-    """The matching views: maps, traces, ranking, spectra, inertials, notes."""
+    """The matching views: maps, motions, ranking, spectra, inertials, notes."""
     rng = np.random.default_rng(7)
     q_edges, qd_edges = np.linspace(-1.5, 1.5, 19), np.linspace(-2.0, 2.0, 17)
     q, qd = (0.5 * (e[1:] + e[:-1]) for e in (q_edges, qd_edges))
     t = np.arange(0.0, 12.0, 0.02)
-    maps, traces, spectra = {}, {}, {}
+    maps, spectra = {}, {}
+    motions = [{"recording": f"wave_{i}.csv", "t": t.tolist(), "joints": {}} for i in (3, 1)]
     for i, name in enumerate(JOINTS):
         size = 8.0 / (1 + i)
         nominal = size * np.tanh(qd / 0.2)[None, :] + 0.3 * size * np.sin(2 * q)[:, None]
@@ -114,13 +115,19 @@ def example_views() -> dict:
         rigid = 4 * size * np.sin(phase) + size * np.sin(2.3 * phase)
         friction = size * np.tanh(6 * np.cos(phase))
         noise = 0.08 * size * rng.standard_normal(t.size)
-        traces[name] = {
-            "recording": "wave_3.csv",
-            "t": t.tolist(),
+        swing = 1.4 * np.sin(phase)
+        motions[0]["joints"][name] = {
+            "q": swing.tolist(),
+            "qd": (1.4 * 0.7 * np.cos(phase)).tolist(),
             "measured": (rigid + friction + noise).tolist(),
             "nominal": (0.96 * rigid).tolist(),
             "refit": (1.03 * rigid + 0.2 * size * np.cos(phase)).tolist(),
             "corrected": (rigid + 0.97 * friction).tolist(),
+        }
+        # The second one is half as fast, and a value of it is missing.
+        motions[1]["joints"][name] = {
+            key: [None if i == 3 else (0.5 if key == "qd" else 1.0) * v for i, v in enumerate(values)]
+            for key, values in motions[0]["joints"][name].items()
         }
         f = np.geomspace(0.1, 50.0, 60)
         spectra[name] = {
@@ -133,7 +140,7 @@ def example_views() -> dict:
         "joints": list(JOINTS),
         "recordings": ["wave_1.csv", "wave_2.csv", "wave_3.csv"],
         "maps": maps,
-        "traces": traces,
+        "motions": motions,
         "ranking": [
             _ranked("stribeck_friction", ["joint2"], 1843.7, 0.97, True, "alone"),
             _ranked("coulomb_friction", ["joint2"], 1790.1, 0.0, False, "alone"),

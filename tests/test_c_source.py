@@ -1,6 +1,7 @@
 """Inverse dynamics as plain C: compiled by the system's compiler, it says what the library says."""
 
 import ctypes
+import dataclasses
 import shutil
 import subprocess
 
@@ -37,15 +38,17 @@ def compiled(robot, folder):
 
 
 def robots(tmp_path):
-    """The IRB 140 with friction and springs, and one of hinges and slides that someone could have built."""
+    """The IRB 140 with friction and springs, one of hinges and slides, and one that branches."""
     path = tmp_path / "robot.xml"
     path.write_text(random_robot(3, 5, slides=0.4))
     fields = lambda r: (r.damping, r.frictionloss, r.stiffness)  # noqa: E731
     each = jnp.arange(1.0, 7.0)
-    return [eqx.tree_at(fields, irb140(), (each, 0.5 * each, 2.0 * each)), load_robot(path)]
+    chain = load_robot(path)
+    tree = dataclasses.replace(chain, parent=(-1, 0, 1, 0, 3))
+    return [eqx.tree_at(fields, irb140(), (each, 0.5 * each, 2.0 * each)), chain, tree]
 
 
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("which", [0, 1, 2])
 def test_the_c_code_says_what_the_library_says(tmp_path, which):
     robot = robots(tmp_path)[which]
     torque = compiled(robot, tmp_path)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from irb140_jax.errors import InputError
 from irb140_jax.recordings import conceal as conceal_module
-from irb140_jax.recordings.conceal import Concealment, Noise, conceal, demo_case, random_robot, seal
+from irb140_jax.recordings.conceal import Concealment, Noise, conceal, demo_case, random_robot, seal, sealed
 from irb140_jax.recordings.concealed.catalogue import FIRST_NINE, HIDDEN
 from irb140_jax.recordings.concealed.closed_loop import _rings
 from irb140_jax.recordings.concealed.plant import arm_model, arm_spec, perturb_inertials, rigid_torque
@@ -280,10 +280,39 @@ def test_recordings_hold_positions_and_torques_at_500_hz_and_no_more():
     assert recording.joint_names == irb140().joint_names
 
 
-def test_seal_is_the_hash_of_the_whole_truth():
+def perturbed(x, rng: np.random.Generator):
+    """The same truth as another processor would round it."""
+    if isinstance(x, dict):
+        return {key: perturbed(value, rng) for key, value in x.items()}
+    if isinstance(x, list):
+        return [perturbed(value, rng) for value in x]
+    return x * (1.0 + 1e-9 * rng.normal()) if isinstance(x, float) else x
+
+
+def test_the_seal_is_the_hash_of_the_effects_and_their_parameters():
     case = case_with(hiding("torque_gain"))
-    assert case.seal == hashlib.sha256(json.dumps(case.truth, sort_keys=True).encode()).hexdigest()
-    assert seal({**case.truth, "effects": []}) != case.seal
+    assert case.seal == hashlib.sha256(sealed(case.truth).encode()).hexdigest()
+    (effect,) = json.loads(sealed(case.truth))["effects"]
+    assert (effect["effect"], effect["joints"]) == ("torque_gain", case.truth["effects"][0]["joints"])
+    assert float(effect["parameters"]["gain"].split()[0]) == pytest.approx(told(case)["gain"], rel=5e-4)
+
+
+@pytest.mark.parametrize("effect", FIRST_NINE)
+def test_the_seal_does_not_depend_on_last_digits(effect):
+    case = case_with(hiding(effect))
+    rng = np.random.default_rng(1)
+    assert {seal(perturbed(case.truth, rng)) for _ in range(20)} == {case.seal}
+    # What a simulation of stick and slip may change by far more than rounding is not in it.
+    assert seal({**case.truth, "left_out": {}, "link_masses": {}}) == case.seal
+
+
+def test_another_truth_has_another_seal():
+    truth = case_with(hiding("torque_gain")).truth
+    (effect,) = truth["effects"]
+    gain = {"gain": {**effect["parameters"]["gain"], "value": effect["parameters"]["gain"]["value"] * 1.002}}
+    others = [{**truth, "effects": []}, {**truth, "seed": 99}, {**truth, "effects": [{**effect, "parameters": gain}]},
+              {**truth, "effects": [{**effect, "joints": ["joint6"]}]}]  # fmt: skip
+    assert len({seal(t) for t in [truth, *others]}) == 5
 
 
 def test_demo_hides_one_of_the_nine_at_6_to_20_per_cent():

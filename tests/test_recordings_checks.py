@@ -2,7 +2,9 @@
 
 import dataclasses
 import pathlib
+import re
 
+import equinox as eqx
 import helpers_recordings as made
 import mujoco
 import numpy as np
@@ -109,11 +111,90 @@ def test_torque_on_the_motor_side_is_recognised(sound, robot, tmp_path):
     assert "gear ratio" in refusal(changed(sound, tau=sound.tau / 100), robot, tmp_path)
 
 
-def test_a_torque_that_never_changes_while_the_joint_moves_is_refused(sound, robot, tmp_path):
+def test_a_robot_without_any_torque_that_changes_is_refused(sound, robot, tmp_path):
+    assert "dead channels" in refusal(changed(sound, tau=np.zeros_like(sound.tau)), robot, tmp_path)
+
+
+@pytest.mark.parametrize("factor", [1000.0, 0.02])
+@pytest.mark.parametrize("kind", [{}, {"pendulum": True}])
+def test_torque_in_another_unit_is_refused_with_the_factor_that_mends_it(tmp_path, kind, factor):
+    sound, robot = made.recording(friction=0.1, **kind), made.robot(**kind)
+    message = refusal(changed(sound, tau=factor * sound.tau), robot, tmp_path)
+    assert ("mN m" in message) == (factor == 1000.0)
+    (said,) = re.findall(rf'"tau.{sound.joint_names[0]}" = (\S+?),? ', message + " ")
+    assert float(said) == pytest.approx(1.0 / factor, rel=0.1)
+
+
+def test_torque_in_percent_of_the_rated_is_refused(sound, robot, tmp_path):
+    percent = 100.0 / np.array([15.0, 5.0, 0.6])
+    assert "percent of the rated torque" in refusal(changed(sound, tau=percent * sound.tau), robot, tmp_path)
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_positions_of_the_wrong_sign_are_recognised(robot, tmp_path, joint):
+    sound = made.recording(seed=1, speeds=False)
+    sign = np.where(np.arange(3) == joint, -1.0, 1.0)
+    said = refusal(changed(sound, q=sign * sound.q), robot, tmp_path)
+    assert sound.joint_names[joint] in said and "= -1" in said
+
+
+def test_an_axis_that_the_model_has_the_other_way_round_is_recognised(robot, tmp_path):
+    sound = made.recording(seed=2, speeds=False)
+    sign = np.array([1.0, -1.0, 1.0])
+    message = refusal(changed(sound, q=sign * sound.q, tau=sign * sound.tau), robot, tmp_path)
+    assert "both count the other way round" in message and '"q.elbow" = -1' in message and '"tau.elbow" = -1' in message
+
+
+def test_exchanged_positions_are_recognised(robot, tmp_path):
+    sound = made.recording(seed=1, speeds=False)
+    assert "exchanged" in refusal(changed(sound, q=sound.q[:, [1, 0, 2]]), robot, tmp_path)
+
+
+def test_gravity_turned_round_in_the_model_is_recognised(sound, robot, tmp_path):
+    turned = eqx.tree_at(lambda r: r.gravity, robot, -robot.gravity)
+    assert "gravity in the model looks reversed" in refusal(sound, turned, tmp_path)
+
+
+@pytest.mark.parametrize("offset", [2.5, -1.6])
+def test_a_zero_far_off_is_recognised_with_its_offset(robot, tmp_path, offset):
+    sound = made.recording(seed=1, speeds=False)
+    message = refusal(changed(sound, q=sound.q + np.array([0.0, offset, 0.0])), robot, tmp_path)
+    (said,) = re.findall(r'"q.elbow" = (\S+?),', message)
+    assert float(said) == pytest.approx(-offset, abs=0.15)
+
+
+def test_a_drive_that_lags_by_much_is_no_reversed_torque(tmp_path):
+    arm = made.model(pendulum=True)
+    t = np.arange(3000) / 250
+    w, a = np.array([8.5, 10.0, 11.0]), np.array([0.3, 0.2, 0.2])
+    wave = lambda f, k: (f(np.outer(t, w)) @ (a * w**k))[:, None]  # noqa: E731
+    q, qd, qdd = wave(np.sin, 0), wave(np.cos, 1), -wave(np.sin, 2)
+    tau = made.rigid_torque(arm, q, qd, qdd) + 6.0 * np.sign(qd) + 2.0 * qd
+    late = np.interp(t - 0.3, t, tau[:, 0])[:, None]
+    recording = read(Recording(t, q, late, ("hinge",)), made.robot(pendulum=True), tmp_path)
+    assert "comes about 3" in " ".join(recording.notes)
+
+
+def test_a_dead_torque_leaves_its_joint_out_and_says_so(sound, robot, tmp_path):
     tau = sound.tau.copy()
     tau[:, 1] = 0.0
-    message = refusal(changed(sound, tau=tau), robot, tmp_path)
-    assert "column tau.elbow is 0 in every row" in message and "dead channel" in message
+    again = read(changed(sound, tau=tau), robot, tmp_path)
+    assert again.torque_lost is not None and again.torque_lost.all(axis=0).tolist() == [False, True, False]
+    assert "tau.elbow is 0 in every row" in " ".join(again.notes) and "elbow is not judged" in " ".join(again.notes)
+
+
+def test_a_torque_that_freezes_is_left_out_from_there_on(sound, robot, tmp_path):
+    tau = sound.tau.copy()
+    tau[1200:, 0] = tau[1200, 0]
+    again = read(changed(sound, tau=tau), robot, tmp_path)
+    assert again.torque_lost is not None
+    np.testing.assert_array_equal(np.flatnonzero(again.torque_lost[:, 0]), np.arange(1200, len(tau)))
+    assert not again.torque_lost[:, 1:].any() and "tau.shoulder is frozen" in " ".join(again.notes)
+
+
+@pytest.mark.parametrize("step", [0.05, 2.0])
+def test_a_coarse_torque_is_not_frozen(sound, robot, tmp_path, step):
+    assert read(changed(sound, tau=step * np.round(sound.tau / step)), robot, tmp_path).torque_lost is None
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-5])

@@ -2,28 +2,9 @@
 
 import numpy as np
 import pytest
+from helpers_testbed import finding, hidden, line
 
 from testbed import scoring, statistics
-
-
-def finding(effect, joints, p=0.99, alternatives=(), **parameters):
-    return {"effect": effect, "joints": list(joints), "evidence": {"probability": p},
-            "parameters": {k: {"value": v, "std": s} for k, (v, s) in parameters.items()},
-            "alternatives": [{"effect": a} for a in alternatives]}  # fmt: skip
-
-
-def hidden(slug, joints, accept=(), tolerate=(), role="special", unnamed=False, **parameters):
-    return {"kind": slug or "odd", "slug": slug, "joints": list(joints), "parameters": parameters, "role": role,
-            "accept": [*([slug] if slug else []), *accept], "tolerate": list(tolerate), "unnamed": unnamed}  # fmt: skip
-
-
-def line(findings, truth, verdict="physics_left_out", unexplained=(), not_testable=(), dead=(), notes=()):
-    fit = {joint: {"noise_floor": floor} for joint, floor in (("a", 0.3), ("b", 0.1))}
-    said = {"verdict": verdict, "findings": findings, "unexplained": list(unexplained), "notes": list(notes),
-            "not_testable": list(not_testable), "fit": fit}  # fmt: skip
-    return {"diagnosis": said, "truth": {"hidden": truth, "dead": list(dead), "torque": {"a": 2.0, "b": 1.0}},
-            "noise_in_band": {"a": 0.1, "b": 0.1},
-            "unseen": {"refit": {"a": 2.0, "b": 1.0}, "corrected": {"a": 1.0, "b": 0.5}}}  # fmt: skip
 
 
 def test_a_name_is_false_at_another_joint_or_where_nothing_allows_it():
@@ -79,7 +60,8 @@ def test_floors_errors_and_places_are_read_off():
     assert scoring.floors(got) == pytest.approx([3.0, 1.0])
     assert scoring.unseen_ratio(got) == pytest.approx(0.5)
     assert scoring.located(got) == [("odd", "located")]
-    assert scoring.located(line([], odd, notes=["a is dead"])) == [("odd", "noted")]
+    assert scoring.located(line([], odd, notes=["a: its torque is constant"])) == [("odd", "noted")]
+    assert scoring.located(line([], odd, notes=["a: 3 samples were filled in"])) == [("odd", "not said")]
     assert scoring.located(line([], odd)) == [("odd", "not said")]
 
 

@@ -1,10 +1,10 @@
 """irb140 demo."""
 
 import dataclasses
-import json
 import pathlib
 import shutil
-from typing import TYPE_CHECKING, Annotated
+from json import dumps
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import arg
 
@@ -22,11 +22,18 @@ if TYPE_CHECKING:
 class Demo:
     """Hide an effect, diagnose blind, then reveal the truth."""
 
+    EXAMPLES: ClassVar = """\
+irb140 demo                         into irb140-demo-0
+irb140 demo --seed 7 --out demo     another effect, joint and strength"""
+
     seed: int = 0
     """Draws the effect, its joint and strength, the wrong inertials, the motions and the noise."""
 
     out: Annotated[pathlib.Path | None, arg(metavar="DIR")] = None
     """Folder for recordings, diagnosis, report and truth; by default irb140-demo-SEED in the current one."""
+
+    json: bool = False
+    """Print diagnosis.json, and what is meant for people to stderr."""
 
     def run(self) -> None:
         if self.seed < 0:
@@ -44,14 +51,14 @@ class Demo:
         with progress() as tell:
             tell("MuJoCo drives an arm with something hidden in it")
             case = demo_case(self.seed)
-        terminal = console()
+        terminal = console(stderr=self.json)
         said = f"Something may be hidden in these recordings. SHA-256 of the truth: {case.seal}"
         terminal.print(said, soft_wrap=True)
         result = _from_files(case, results.desk)
         reveal = revealed(case.truth["effects"], result.diagnosis, case.seal)
-        folder = results.write(lambda folder: _write(result, reveal, case, results.desk, folder))
+        folder = results.write(lambda folder: _write(result, reveal, case, results.desk, folder, out))
         tell_kept(results)
-        show(result, out if folder == results.folder else folder)
+        show(result, out if folder == results.folder else folder, json=self.json)
         print_reveal(reveal, terminal)
 
 
@@ -67,12 +74,17 @@ def _from_files(case: "ConcealedCase", desk: pathlib.Path) -> "Result":
     return diagnosed(robot, [read_recording(path, robot) for path in paths])
 
 
-def _write(result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path) -> None:
-    """Recordings, diagnosis, report and truth into an empty folder."""
+def _write(
+    result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path,
+    out: pathlib.Path,
+) -> None:  # fmt: skip
+    """Recordings, diagnosis, report and truth into an empty folder, which will be `out`."""
     from irb140_jax.mismatch import save
+    from irb140_jax.recordings.conceal import sealed
     from irb140_jax.report import html_report
 
     shutil.copytree(desk, folder, dirs_exist_ok=True)
     save(result, folder)
-    (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal), encoding="utf-8")
-    (folder / "truth.json").write_text(json.dumps(case.truth | {"seal": case.seal}, indent=1) + "\n", encoding="utf-8")
+    (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal, out), encoding="utf-8")
+    truth = case.truth | {"sealed": sealed(case.truth), "seal": case.seal}
+    (folder / "truth.json").write_text(dumps(truth, indent=1) + "\n", encoding="utf-8")

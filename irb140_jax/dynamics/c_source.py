@@ -25,8 +25,14 @@ static void cross_add(const vec a, const vec b, vec y) {
 
 void inverse_dynamics(const double q[N], const double qd[N], const double qdd[N], double tau[N]) {
     double R[N][9];
-    vec p[N], f[N], m[N], w = {0, 0, 0}, dw = {0, 0, 0}, a = {-GRAVITY[0], -GRAVITY[1], -GRAVITY[2]};
+    vec p[N], f[N], m[N], turn[N], spin_up[N], rise[N];
+    const vec still = {0, 0, 0}, base = {-GRAVITY[0], -GRAVITY[1], -GRAVITY[2]};
     for (int i = 0; i < N; i++) {
+        const int before = PARENT[i];
+        const double *old_w = before < 0 ? still : turn[before], *old_dw = before < 0 ? still : spin_up[before];
+        const double *old_a = before < 0 ? base : rise[before];
+        double *w = turn[i], *dw = spin_up[i], *a = rise[i];
+        for (int k = 0; k < 3; k++) { w[k] = old_w[k]; dw[k] = old_dw[k]; a[k] = old_a[k]; }
         const double *z = AXIS[i], x = q[i] - REFERENCE[i];
         double S[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
         vec slide = {0, 0, 0}, t;
@@ -76,12 +82,13 @@ void inverse_dynamics(const double q[N], const double qd[N], const double qdd[N]
         tau[i] = z[0] * load[0] + z[1] * load[1] + z[2] * load[2];
         tau[i] += ARMATURE[i] * qdd[i] + DAMPING[i] * x + FRICTION[i] * ((x > 0) - (x < 0));
         tau[i] += STIFFNESS[i] * (q[i] - REST[i]);
-        if (i) {
+        if (PARENT[i] >= 0) {
+            double *on = f[PARENT[i]], *about = m[PARENT[i]];
             vec force, moment;
             rotate(R[i], f[i], force);
             rotate(R[i], m[i], moment);
             cross_add(p[i], force, moment);
-            for (int k = 0; k < 3; k++) { f[i-1][k] += force[k]; m[i-1][k] += moment[k]; }
+            for (int k = 0; k < 3; k++) { on[k] += force[k]; about[k] += moment[k]; }
         }
     }
 }
@@ -92,7 +99,7 @@ def c_source(robot: Robot) -> str:
     """C code of `inverse_dynamics(q, qd, qdd, tau)` for this robot; all its numbers are in it, to the last digit.
 
     Args:
-        robot: A serial arm with n joints; what is identified of it included.
+        robot: Any robot with n joints; what is identified of it included.
 
     Returns:
         A translation unit that needs only the C standard library; equal to `dynamics.inverse_dynamics` to round-off.
@@ -106,6 +113,7 @@ def c_source(robot: Robot) -> str:
     }  # fmt: skip
     lines = [_table(name, np.asarray(values).reshape(robot.n, -1)) for name, values in tables.items()]
     lines.append("static const int SLIDE[N] = {" + ", ".join(str(int(s)) for s in robot.is_slide) + "};")
+    lines.append("static const int PARENT[N] = {" + ", ".join(str(int(p)) for p in robot.parent) + "};")
     lines.append(f"static const double GRAVITY[3] = {_row(np.asarray(robot.gravity))};")
     name = "".join(c if c.isprintable() and c not in "*/" else " " for c in robot.name)
     return _SOURCE.replace("@NAME@", name).replace("@N@", str(robot.n)).replace("@TABLES@", "\n".join(lines))

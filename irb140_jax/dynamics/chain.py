@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 from irb140_jax.dynamics.regroup import regrouping
 from irb140_jax.dynamics.scalars import Matrix, Number, Vector
 from irb140_jax.robot import Robot
+from irb140_jax.robot.tree import Parents
 
 # An entry this close to 0, 1 or -1 is taken to be it: the round-off of rotations that a model file gives as angles.
 SNAP = 1e-15
@@ -30,11 +31,13 @@ class Plan(eqx.Module):
         known: For each number of `numbers`, 0, 1 or -1 if it is that for sure, else None.
         regroup: Map of the inertial parameters onto fewer of the same torques; None if the geometry is traced.
         is_slide: True for prismatic joints.
+        parent: Link that each link sits on, -1 for the base.
     """
 
     known: Known = eqx.field(static=True)
     regroup: Float[Array, "k k"] | None
     is_slide: tuple[bool, ...] = eqx.field(static=True)
+    parent: Parents = eqx.field(static=True)
 
 
 class Link(NamedTuple):
@@ -51,10 +54,11 @@ class Link(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """All links from base to tip, and gravity in base axes."""
+    """All links from the base outward, gravity in base axes, and the link that each sits on (see `Robot.parent`)."""
 
     links: tuple[Link, ...]
     gravity: Vector
+    parent: Parents
 
 
 _plans: OrderedDict[tuple, tuple[tuple, Plan]] = OrderedDict()
@@ -67,8 +71,8 @@ def plan(robot: Robot, regrouped: bool = True) -> Plan:
     """
     geometry = (robot.rotation, robot.position, robot.axis, robot.reference, robot.gravity)
     if any(isinstance(x, Tracer) for x in geometry):
-        return Plan((None,) * (26 * robot.n + 3), None, robot.is_slide)
-    key = (*map(id, geometry), robot.is_slide, regrouped)
+        return Plan((None,) * (26 * robot.n + 3), None, robot.is_slide, robot.parent)
+    key = (*map(id, geometry), robot.is_slide, robot.parent, regrouped)
     if key not in _plans:
         # The arrays are kept beside their plan, so that their ids can't pass to others.
         _plans[key] = (geometry, _plan(robot, regrouped))
@@ -80,14 +84,14 @@ def plan(robot: Robot, regrouped: bool = True) -> Plan:
 def _plan(robot: Robot, regrouped: bool) -> Plan:
     rotation, position, axis = (np.asarray(x) for x in (robot.rotation, robot.position, robot.axis))
     reference, gravity = np.asarray(robot.reference), np.asarray(robot.gravity)
-    regroup, gone = regrouping(rotation, position, axis, robot.is_slide)
+    regroup, gone = regrouping(rotation, position, axis, robot.is_slide, robot.parent)
     known: list[float | None] = []
     for i in range(robot.n):
         known.extend(_snapped(x) for x in (*rotation[i].ravel(), *position[i], *axis[i], reference[i]))
         known.extend(0.0 if regrouped and zero else None for zero in gone[i])
     known.extend(_snapped(x) for x in gravity)
     with jax.ensure_compile_time_eval():
-        return Plan(tuple(known), jnp.asarray(regroup) if regrouped else None, robot.is_slide)
+        return Plan(tuple(known), jnp.asarray(regroup) if regrouped else None, robot.is_slide, robot.parent)
 
 
 def _snapped(x: float) -> float | None:
@@ -118,4 +122,4 @@ def chain(robot: Robot, ahead: Plan) -> Chain:
         xx, xy, xz, yy, yz, zz = itertools.islice(take, 6)
         inertia = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
         links.append(Link(rotation, position, axis, reference, mass, first, inertia, slides))
-    return Chain(tuple(links), vector())
+    return Chain(tuple(links), vector(), ahead.parent)

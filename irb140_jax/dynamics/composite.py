@@ -6,7 +6,7 @@ gives to the point of its link passing the base's origin, the Jacobians of link 
     Jw_ij = w_j,   Jv_ij = v_j + w_j x c_i      (equations 11 and 12: z_j x (c_i - p_j) = z_j x c_i + p_j x z_j).
 
 Nothing but c_i depends on the link, so the sums over links of equation 10 act on masses, first moments and inertias
-alone, and each is needed once per joint: for the links i >= j that joint j carries.
+alone, and each is needed once per joint: for the links that joint j carries, in a chain i >= j.
 """
 
 from typing import NamedTuple
@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 
 from irb140_jax.kinematics import cross, link_frames
 from irb140_jax.robot import Robot
+from irb140_jax.robot.tree import Parents, moves
 from irb140_jax.types import JointMatrix, Joints
 
 
@@ -37,7 +38,7 @@ class Links(NamedTuple):
 
 
 class Composite(NamedTuple):
-    """Inertial parameters of all links from joint j on, as one body about the base's origin.
+    """Inertial parameters of all links that joint j carries, as one body about the base's origin.
 
     Attributes:
         mass: Mass [kg], shape (n, 1).
@@ -70,7 +71,7 @@ def placed_links(robot: Robot, q: Joints) -> Links:
 
 
 def composite(robot: Robot, links: Links) -> Composite:
-    """Mass, first moment and inertia of what each joint carries (parallel-axis theorem, then sums from the tip).
+    """Mass, first moment and inertia of what each joint carries (parallel-axis theorem, then sums from the tips).
 
     Args:
         robot: Arm with n joints.
@@ -79,7 +80,7 @@ def composite(robot: Robot, links: Links) -> Composite:
     moment = robot.mass[:, None] * links.centre
     spread = jnp.sum(moment * links.centre, axis=-1)[:, None, None] * jnp.eye(3)
     about_base = links.inertia + spread - moment[:, :, None] * links.centre[:, None, :]
-    return Composite(from_tip(robot.mass[:, None]), from_tip(moment), from_tip(about_base))
+    return Composite(*(from_tips(x, robot.parent) for x in (robot.mass[:, None], moment, about_base)))
 
 
 def momenta(links: Links, beyond: Composite) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
@@ -113,14 +114,28 @@ def pairs(*terms: tuple[Float[Array, "n 3"], Float[Array, "n 3"]]) -> JointMatri
     return jnp.asarray(sum(products))
 
 
-def from_tip(x: Float[Array, "n *k"]) -> Float[Array, "n *k"]:
-    """Sums over the links i >= j."""
-    return from_base(x[::-1])[::-1]
-
-
-def from_base(x: Float[Array, "n *k"]) -> Float[Array, "n *k"]:
-    """Sums over the links i <= j.  Written out: XLA's cumsum is several times slower over a batch of short arms."""
-    sums = [x[0]]
-    for row in x[1:]:
-        sums.append(sums[-1] + row)
+def from_tips(x: Float[Array, "n *k"], parent: Parents) -> Float[Array, "n *k"]:
+    """Sums over the links that each joint carries."""
+    sums = list(x)
+    for i in reversed(range(len(sums))):
+        if parent[i] >= 0:
+            sums[parent[i]] = sums[parent[i]] + sums[i]
     return jnp.stack(sums)
+
+
+def from_base(x: Float[Array, "n *k"], parent: Parents) -> Float[Array, "n *k"]:
+    """Sums over the joints that move each link.
+
+    Written out: XLA's cumsum is several times slower over a batch of short arms.
+    """
+    sums: list[Array] = []
+    for row, before in zip(x, parent, strict=True):
+        sums.append(row if before < 0 else sums[before] + row)
+    return jnp.stack(sums)
+
+
+def by_order(outer: JointMatrix, inner: JointMatrix, parent: Parents) -> JointMatrix:
+    """Entries (j, k) of `outer` where joint j carries joint k or is it, of `inner` where k carries j, else 0."""
+    carries = moves(parent).T
+    rest = inner if np.all(carries | carries.T) else jnp.where(carries.T, inner, 0.0)
+    return jnp.where(carries, outer, rest)

@@ -15,16 +15,16 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from irb140_jax.dynamics.composite import (
     Composite,
     Links,
     apply,
+    by_order,
     composite,
     from_base,
-    from_tip,
+    from_tips,
     momenta,
     pairs,
     placed_links,
@@ -69,13 +69,12 @@ def coriolis_matrix(robot: Robot, q: Joints, qd: Joints) -> JointMatrix:
     links = placed_links(robot, q)
     beyond = composite(robot, links)
     rates = _rates(robot, links, qd)
-    # Joint k carries the links both joints move (j <= k): project the rates of its momenta on joint j.
+    # Joint k carries the links both joints move (j = k or j before k): project the rates of its momenta on joint j.
     linear = beyond.mass * rates.v + cross(rates.w, beyond.first) + cross(links.w, rates.momentum)
     angular = cross(beyond.first, rates.v) + apply(beyond.inertia, rates.w) + apply(rates.moment, links.w)
     later = pairs((links.v, linear), (links.w, angular))
-    # Joint j carries them (k < j): the same sums, with joint j's momenta on the left.
-    earlier = _earlier(links, beyond, rates)
-    return jnp.where(np.tri(robot.n, dtype=bool).T, later, earlier)
+    # Joint j carries them (k before j): the same sums, with joint j's momenta on the left.
+    return by_order(later, _earlier(links, beyond, rates), robot.parent)
 
 
 def _earlier(links: Links, beyond: Composite, rates: Rates) -> JointMatrix:
@@ -85,7 +84,7 @@ def _earlier(links: Links, beyond: Composite, rates: Rates) -> JointMatrix:
 
 
 def _rates(robot: Robot, links: Links, qd: Joints) -> Rates:
-    omega, u = from_base(links.w * qd[:, None]), from_base(links.v * qd[:, None])
+    omega, u = (from_base(x * qd[:, None], robot.parent) for x in (links.w, links.v))
     speed = u + cross(omega, links.centre)
     moment = robot.mass[:, None] * links.centre
     half_trace = 0.5 * jnp.trace(links.inertia, axis1=1, axis2=2)[:, None, None]
@@ -96,8 +95,8 @@ def _rates(robot: Robot, links: Links, qd: Joints) -> Rates:
     return Rates(
         w=cross(omega, links.w),
         v=cross(omega, links.v) + cross(u, links.w),
-        momentum=from_tip(robot.mass[:, None] * speed),
-        moment=from_tip(drift - swing),
+        momentum=from_tips(robot.mass[:, None] * speed, robot.parent),
+        moment=from_tips(drift - swing, robot.parent),
     )
 
 

@@ -1,12 +1,14 @@
 """Normal equations of a whole recording without its regressor in memory."""
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from irb140_jax.dynamics.chain import Plan, chain, plan
 from irb140_jax.dynamics.chunks import sum_of_chunks
 from irb140_jax.dynamics.regressor import regressor_blocks
 from irb140_jax.robot import Robot
+from irb140_jax.robot.tree import carried, path
 from irb140_jax.types import JointSamples
 
 
@@ -21,7 +23,7 @@ def regressor_gram(
     """Gram matrix W^T W of W = diag(weight) [Y, tau], stacked over all samples and joints.
 
     All that least squares needs: Y^T Y phi = Y^T tau, and the squared residual from the last diagonal entry.  The rows
-    of joint j are zero for links before j, so their products are formed of the later columns only.
+    of joint j are zero for links it does not carry, so products are formed of the columns of those it does only.
 
     Args:
         robot: Arm with n joints; its inertial parameters don't matter here.
@@ -43,9 +45,16 @@ def regressor_gram(
 
 def _gram_of_chunk(given: tuple[Robot, Plan], q, qd, qdd, tau, weight) -> Float[Array, "g g"]:
     n = q.shape[1]
-    blocks = regressor_blocks(chain(*given), q.T, qd.T, qdd.T)
+    arm = chain(*given)
+    blocks = regressor_blocks(arm, q.T, qd.T, qdd.T)
     gram = jnp.zeros((10 * n + 1, 10 * n + 1), q.dtype)
     for j in range(n):
-        rows = jnp.concatenate([*(block[j] for block in blocks[j:]), tau[None, :, j]]) * weight[None, :, j]
-        gram = gram.at[10 * j :, 10 * j :].add(rows @ rows.T)
+        links, row = carried(arm.parent, j), len(path(arm.parent, j)) - 1
+        own = [block[row] for block in blocks[links.start : links.stop]]
+        rows = jnp.concatenate([*own, tau[None, :, j]]) * weight[None, :, j]
+        if links.stop == n:
+            gram = gram.at[10 * j :, 10 * j :].add(rows @ rows.T)
+        else:
+            at = np.append(np.arange(10 * links.start, 10 * links.stop), 10 * n)
+            gram = gram.at[np.ix_(at, at)].add(rows @ rows.T)
     return gram

@@ -6,7 +6,7 @@ all that joint k carries, about the origin of frame k,
 
     h = sum m x,   I = sum m (x.x 1 - x x^T),   P = sum m xd,   D = sum m ((x . xd) 1 - xd x^T),
 
-and moving to the frame before, by x -> R x + p, keeps m and turns the others, after which
+and moving to the frame of the link before, by x -> R x + p, keeps m and turns the others, after which
 
     h += m p,   I += 2 (p . h) 1 - p h^T - h p^T + m (p.p 1 - p p^T),   D += (p . P) 1 - P p^T.
 """
@@ -37,6 +37,7 @@ from irb140_jax.dynamics.scalars import (
     transpose,
 )
 from irb140_jax.dynamics.stage import always, staged
+from irb140_jax.robot.tree import children, path
 
 # Longest chain that is worked through in one go.
 UNSTAGED = 3
@@ -108,15 +109,17 @@ def terms(arm: Chain, q: list[Number], qd: list[Number]) -> Terms:
     motions = stage(lambda: _motions(arm, places, qd))
     joints = [_joint(place, motion) for place, motion in zip(places, motions, strict=True)]
     result = Terms([[0.0] * n for _ in range(n)], [[0.0] * n for _ in range(n)], [0.0] * n)
-    beyond: _Carried | None = None
+    carried: dict[int, _Carried] = {}
     for k in reversed(range(n)):
-        beyond = stage(partial(_beyond, places, motions, k, beyond))
+        outer = {i: carried.pop(i) for i in children(arm.parent, k)}
+        carried[k] = beyond = stage(partial(_beyond, places, motions, k, outer))
         weight = scale(beyond.mass, motions[k].gravity), cross(beyond.first, motions[k].gravity)
         result.g[k] = mul(-1.0, _project(joints[k], *weight))
-        inertias, later, earlier = stage(partial(_column, places, joints, beyond, k))
-        for j in range(k + 1):
-            result.M[j][k] = result.M[k][j] = inertias[j]
-            result.C[j][k], result.C[k][j] = later[j], earlier[j]
+        way = path(arm.parent, k)
+        inertias, later, earlier = stage(partial(_column, places, joints, beyond, way))
+        for at, j in enumerate(way):
+            result.M[j][k] = result.M[k][j] = inertias[at]
+            result.C[j][k], result.C[k][j] = later[at], earlier[at]
     return stage(lambda: result)
 
 
@@ -124,15 +127,22 @@ def _at_once(work: Callable[[], Result]) -> Result:
     return work()
 
 
-def _beyond(places: list[Placement], motions: list[_Motion], k: int, outer: _Carried | None) -> _Carried:
-    """What joint k carries: its own link and what the next joint carries."""
+def _beyond(places: list[Placement], motions: list[_Motion], k: int, outer: dict[int, _Carried]) -> _Carried:
+    """What joint k carries: its own link and what the joints that sit on it carry."""
     own = _own(places[k], motions[k])
-    return own if outer is None else _sum(own, _moved(places[k + 1], outer))
+    for i, carried in outer.items():
+        own = _sum(own, _moved(places[i], carried))
+    return own
 
 
-def _column(places: list[Placement], joints: list[_Joint], beyond: _Carried, k: int) -> tuple[list, list, list]:
-    """M_jk, C_jk and C_kj for j <= k: momenta of joint k and their rates, handed down from frame to frame."""
-    w, v, w_rate, v_rate = joints[k]
+def _column(
+    places: list[Placement], joints: list[_Joint], beyond: _Carried, way: tuple[int, ...]
+) -> tuple[list, list, list]:
+    """M_jk, C_jk and C_kj of the joints j on the way from the base to joint k, its last.
+
+    Momenta of joint k and their rates, handed down from frame to frame.
+    """
+    w, v, w_rate, v_rate = joints[way[-1]]
     m, h, inertia, P, D = beyond
     momenta = plus(scale(m, v), cross(w, h)), plus(cross(h, v), apply(inertia, w))
     rates = (
@@ -141,9 +151,10 @@ def _column(places: list[Placement], joints: list[_Joint], beyond: _Carried, k: 
     )
     turned = plus(cross(P, v), apply(transpose(D), w))
     M, C, C_turned = [], [], []
-    for j in range(k, -1, -1):
-        if j < k:
-            place = places[j + 1]
+    for at in reversed(range(len(way))):
+        j = way[at]
+        if j != way[-1]:
+            place = places[way[at + 1]]
             momenta, rates, turned = _handed(place, momenta), _handed(place, rates), place.to_parent(turned)
         M.append(_project(joints[j], *momenta))
         C.append(_project(joints[j], *rates))
@@ -153,9 +164,10 @@ def _column(places: list[Placement], joints: list[_Joint], beyond: _Carried, k: 
 
 
 def _motions(arm: Chain, places: list[Placement], qd: list[Number]) -> list[_Motion]:
-    """Velocities and gravity from base to tip."""
-    motion, motions = _Motion(ZERO, ZERO, arm.gravity), []
-    for place, rate in zip(places, qd, strict=True):
+    """Velocities and gravity from the base outward."""
+    motions = [_Motion(ZERO, ZERO, arm.gravity)]  # of the base, then the links
+    for before, place, rate in zip(arm.parent, places, qd, strict=True):
+        motion = motions[before + 1]
         swing = plus(motion.linear, cross(motion.angular, place.position))
         angular, linear = place.to_link(motion.angular), place.to_link(swing)
         along = scale(rate, place.link.axis)
@@ -163,9 +175,8 @@ def _motions(arm: Chain, places: list[Placement], qd: list[Number]) -> list[_Mot
             linear = plus(linear, along)
         else:
             angular = plus(angular, along)
-        motion = _Motion(angular, linear, place.to_link(motion.gravity))
-        motions.append(motion)
-    return motions
+        motions.append(_Motion(angular, linear, place.to_link(motion.gravity)))
+    return motions[1:]
 
 
 def _joint(place: Placement, motion: _Motion) -> _Joint:

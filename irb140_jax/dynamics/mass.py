@@ -1,9 +1,8 @@
 """Joint-space mass matrix by a sum of Jacobians (equations 8 and 10)."""
 
 import jax.numpy as jnp
-import numpy as np
 
-from irb140_jax.dynamics.composite import composite, momenta, pairs, placed_links
+from irb140_jax.dynamics.composite import by_order, composite, momenta, pairs, placed_links
 from irb140_jax.robot import Robot
 from irb140_jax.types import JointMatrix, Joints
 
@@ -11,7 +10,8 @@ from irb140_jax.types import JointMatrix, Joints
 def mass_matrix(robot: Robot, q: Joints) -> JointMatrix:
     """Mass matrix M(q) = sum_i m_i Jv_i^T Jv_i + Jw_i^T I_i Jw_i, plus the rotors' armature on the diagonal.
 
-    The sum over links is done first (see `composite`): M_jk = v_j . f_k + w_j . n_k for j <= k, where f_k, n_k are the
+    The sum over links is done first (see `composite`): M_jk = v_j . f_k + w_j . n_k where joint j
+    carries joint k, and f_k, n_k are the
     momenta of all that joint k carries at its unit speed.
 
     Args:
@@ -26,4 +26,4 @@ def mass_matrix(robot: Robot, q: Joints) -> JointMatrix:
     links = placed_links(robot, q)
     linear, angular = momenta(links, composite(robot, links))
     M = pairs((links.v, linear), (links.w, angular))
-    return jnp.where(np.tri(robot.n, dtype=bool).T, M, M.T) + jnp.diag(robot.armature)
+    return by_order(M, M.T, robot.parent) + jnp.diag(robot.armature)

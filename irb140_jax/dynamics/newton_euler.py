@@ -102,36 +102,37 @@ def link_wrench(link: Link, motion: Motion) -> tuple[Vector, Vector]:
 def outward(
     arm: Chain, q: list[Number], qd: list[Number], qdd: list[Number], predicate: Bool[Array, ""]
 ) -> tuple[list[Placement], list[Motion]]:
-    """Placements and motions of all links, base to tip; the predicate is for `staged`."""
+    """Placements and motions of all links, from the base outward; the predicate is for `staged`."""
     stored = staged(predicate, lambda: [place[1:] for place in placements(arm, q)])
     places = [Placement(link, *place) for link, place in zip(arm.links, stored, strict=True)]
-    motion = Motion(ZERO, ZERO, scale(-1.0, arm.gravity))
-    motions = []
-    for place, *rates in zip(places, qd, qdd, strict=True):
-        motion = staged(predicate, partial(next_motion, place, motion, *rates))
-        motions.append(motion)
-    return places, motions
+    motions = [Motion(ZERO, ZERO, scale(-1.0, arm.gravity))]  # of the base, then the links
+    for before, place, *rates in zip(arm.parent, places, qd, qdd, strict=True):
+        motions.append(staged(predicate, partial(next_motion, place, motions[before + 1], *rates)))
+    return places, motions[1:]
 
 
-def inward(places: list[Placement], motions: list[Motion], predicate: Bool[Array, ""]) -> list[Number]:
-    """Joint torques from the motions, tip to base."""
-    wrench: Wrench = (ZERO, ZERO)
+def inward(
+    arm: Chain, places: list[Placement], motions: list[Motion], predicate: Bool[Array, ""]
+) -> list[Number]:
+    """Joint torques from the motions, tips to base."""
+    passed: list[list[tuple[Placement, Wrench]]] = [[] for _ in places]
     torques: list[Number] = []
     for i in reversed(range(len(places))):
-        outer = places[i + 1] if i + 1 < len(places) else None
-        wrench = staged(predicate, partial(_carried_wrench, places[i].link, motions[i], outer, wrench))
+        wrench = staged(predicate, partial(_carried_wrench, places[i].link, motions[i], passed[i]))
+        if arm.parent[i] >= 0:
+            passed[arm.parent[i]].append((places[i], wrench))
         torques.append(dot(places[i].link.axis, wrench[0] if places[i].link.is_slide else wrench[1]))
     return torques[::-1]
 
 
-def _carried_wrench(link: Link, motion: Motion, outer: Placement | None, wrench: Wrench) -> Wrench:
-    """Wrench that the link's joint carries: the link's own and that of the next joint."""
+def _carried_wrench(link: Link, motion: Motion, outer: list[tuple[Placement, Wrench]]) -> Wrench:
+    """Wrench that the link's joint carries: the link's own and those of the joints that sit on it."""
     force, moment = link_wrench(link, motion)
-    if outer is None:
-        return force, moment
-    passed = outer.to_parent(wrench[0])
-    arm = minus(outer.to_parent(wrench[1]), cross(passed, outer.position))
-    return plus(force, passed), plus(moment, arm)
+    for place, wrench in outer:
+        passed = place.to_parent(wrench[0])
+        arm = minus(place.to_parent(wrench[1]), cross(passed, place.position))
+        force, moment = plus(force, passed), plus(moment, arm)
+    return force, moment
 
 
 def inverse_dynamics(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Joints:
@@ -164,5 +165,5 @@ def rigid_torque(
     """Torques of the rigid bodies alone, shape (n,) for one sample, (n, T) for a batch; qdd = 0 if it is None."""
     predicate = always(q, qd)
     accelerations: list[Number] = [0.0] * len(arm.links) if qdd is None else list(qdd)
-    torques = inward(*outward(arm, list(q), list(qd), accelerations, predicate), predicate)
+    torques = inward(arm, *outward(arm, list(q), list(qd), accelerations, predicate), predicate)
     return jnp.stack([jnp.broadcast_to(jnp.asarray(x, q.dtype), q.shape[1:]) for x in torques])

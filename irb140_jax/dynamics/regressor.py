@@ -4,6 +4,7 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from irb140_jax.dynamics.chain import Chain, Plan, chain, plan
@@ -12,6 +13,7 @@ from irb140_jax.dynamics.newton_euler import Motion, Placement, outward
 from irb140_jax.dynamics.scalars import ZERO, Number, Vector, add, cross, dot, is_known, minus, mul, plus
 from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.robot import Robot
+from irb140_jax.robot.tree import path
 from irb140_jax.types import Joints, JointSamples
 
 # Unit motions of joints: angular, and linear at a frame's origin.
@@ -28,7 +30,8 @@ def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, 
         qdd: Joint accelerations [rad/s^2 or m/s^2].
 
     Returns:
-        Y, columns as in `robot.phi.ravel()`: torque per kg, per kg m and per kg m^2.  Row j is zero for links before j.
+        Y, columns as in `robot.phi.ravel()`: torque per kg, per kg m and per kg m^2.  Row j is zero for links that
+        joint j does not move.
 
     Source: Atkeson, An, Hollerbach (1986), Estimation of inertial parameters of manipulator loads and links.
     """
@@ -50,33 +53,47 @@ def _regressor(
 ) -> Float[Array, "n k *T"]:
     columns = []
     for i, block in enumerate(regressor_blocks(chain(robot, ahead), q, qd, qdd)):
-        missing = [(0, robot.n - i - 1)] + [(0, 0)] * (block.ndim - 1)
-        columns.append(jnp.pad(block, missing))  # (n, 10, *T)
+        columns.append(all_rows(block, path(robot.parent, i), robot.n))  # (n, 10, *T)
     return jnp.concatenate(columns, axis=1)
+
+
+def all_rows(block: Float[Array, "j *k"], joints: tuple[int, ...], n: int) -> Float[Array, "n *k"]:
+    """The rows of some joints, rising, among those of all n joints; the others are zero."""
+    none = [(0, 0)] * (block.ndim - 1)
+    if joints == tuple(range(len(joints))):
+        return jnp.pad(block, [(0, n - len(joints)), *none])
+    places = np.split(np.arange(len(joints)), np.flatnonzero(np.diff(joints) != 1) + 1)
+    pieces, done = [], 0
+    for run in places:  # joints that follow each other
+        start, end = joints[run[0]], joints[run[-1]] + 1
+        pieces.append(jnp.pad(block[run[0] : run[-1] + 1], [(start - done, 0), *none]))
+        done = end
+    return jnp.pad(jnp.concatenate(pieces), [(0, n - done), *none])
 
 
 def regressor_blocks(
     arm: Chain, q: Float[Array, "n *T"], qd: Float[Array, "n *T"], qdd: Float[Array, "n *T"]
 ) -> list[Float[Array, "j 10 *T"]]:
-    """For each link the regressor's columns of its ten parameters, rows of the joints up to the link's own only.
+    """For each link the regressor's columns of its ten parameters, rows of the joints that move it only.
 
     All joints are done at once, along the first axis; so that scalars of a sample meet it, they have an axis of one.
     """
     predicate = always(q, qd)
     scalars = lambda x: [x[i : i + 1] for i in range(len(arm.links))]  # noqa: E731
     places, motions = outward(arm, scalars(q), scalars(qd), scalars(qdd), predicate)
-    screws: Screw = (ZERO, ZERO)
+    screws: list[Screw] = [(ZERO, ZERO)]  # seen from the base, then the links
     blocks = []
     for i, (place, motion) in enumerate(zip(places, motions, strict=True)):
-        screws = staged(predicate, partial(_next_screws, place, screws, q[:i]))
-        block = staged(predicate, partial(_block, screws, motion))
-        filled = [jnp.broadcast_to(jnp.asarray(x, q.dtype), (i + 1, *q.shape[1:])) for x in block]
+        before, depth = arm.parent[i], len(path(arm.parent, i))
+        screws.append(staged(predicate, partial(_next_screws, place, screws[before + 1], q[: depth - 1])))
+        block = staged(predicate, partial(_block, screws[-1], motion))
+        filled = [jnp.broadcast_to(jnp.asarray(x, q.dtype), (depth, *q.shape[1:])) for x in block]
         blocks.append(jnp.stack(filled, axis=1))
     return blocks
 
 
 def _next_screws(place: Placement, screws: Screw, like: Float[Array, "j *T"]) -> Screw:
-    """Unit motions of all joints up to the link's own, seen from the link, out of those seen from its parent."""
+    """Unit motions of all joints that move the link, seen from the link, out of those seen from its parent."""
     angular, linear = screws
     carried = place.to_link(angular), place.to_link(plus(linear, cross(angular, place.position)))
     own = (ZERO, place.link.axis) if place.link.is_slide else (place.link.axis, ZERO)

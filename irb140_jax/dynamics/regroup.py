@@ -6,6 +6,8 @@ Torques stay the same, but a third of the parameters becomes zero, and with them
 import numpy as np
 from jaxtyping import Float
 
+from irb140_jax.robot.tree import Parents
+
 ROWS, COLS = np.triu_indices(3)
 
 
@@ -14,6 +16,7 @@ def regrouping(
     position: Float[np.ndarray, "n 3"],
     axis: Float[np.ndarray, "n 3"],
     is_slide: tuple[bool, ...],
+    parent: Parents,
 ) -> tuple[Float[np.ndarray, "k k"], np.ndarray]:
     """Linear map of `Robot.phi` (raveled) onto parameters of the same torques, and which of them are zero always.
 
@@ -22,7 +25,7 @@ def regrouping(
     What would move to the base is dropped.
 
     Args:
-        rotation, position, axis, is_slide: As in `Robot`.
+        rotation, position, axis, is_slide, parent: As in `Robot`.
 
     Returns:
         The map, and a mask of shape (n, 10), true where its result is zero.
@@ -34,8 +37,8 @@ def regrouping(
     gone = np.zeros((n, 10), bool)
     for i in reversed(range(n)):
         moves = _free_of_slide() if is_slide[i] else _free_of_hinge(axis[i])
-        if i > 0:
-            rows[i - 1] += _to_parent(rotation[i], position[i]) @ moves @ rows[i]
+        if parent[i] >= 0:
+            rows[parent[i]] += _to_parent(rotation[i], position[i]) @ moves @ rows[i]
         stays = np.eye(10) - moves
         # Rows that vanish up to the round-off of a unit axis.
         gone[i] = ~np.any(np.abs(stays) > 1e-15, axis=1)

@@ -14,6 +14,7 @@ from irb140_jax.dynamics.newton_euler import Motion, inward, link_wrench, next_m
 from irb140_jax.dynamics.scalars import ZERO, Number, cross, dot, plus, scale
 from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.robot import Robot
+from irb140_jax.robot.tree import serial
 
 Scalars = Sequence[Number]
 Result = TypeVar("Result")
@@ -104,10 +105,10 @@ def stored(q: Scalars, work: Callable[[], Result]) -> Result:
 
 def _recursive(arm: ScalarArm, q: Scalars, qd: Scalars, qdd: Scalars) -> Scalars:
     """Torque of the rigid bodies by the Newton-Euler recursion."""
-    if arm.n <= UNSTAGED:
+    if arm.n <= UNSTAGED and arm.links.parent == serial(arm.n):
         return _in_one_go(arm.links, q, qd, qdd)
     predicate = always(*(jnp.asarray(x) for x in q))
-    return inward(*outward(arm.links, list(q), list(qd), list(qdd), predicate), predicate)
+    return inward(arm.links, *outward(arm.links, list(q), list(qd), list(qdd), predicate), predicate)
 
 
 def _in_one_go(links: Chain, q: Scalars, qd: Scalars, qdd: Scalars) -> Scalars:

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from irb140_jax.errors import RobotError
 from irb140_jax.kinematics.dh import DHTable
 from irb140_jax.kinematics.forward import link_frames
 from irb140_jax.robot import Robot
@@ -35,8 +36,16 @@ def dh_of(robot: Robot) -> DHView:
     Args:
         robot: Serial chain of n hinges and slides, with concrete numbers.
 
+    Raises:
+        RobotError: The robot branches.
+
     Source: Siciliano, Sciavicco, Villani, Oriolo, Robotics (2009), section 2.8.2.
     """
+    if not robot.is_chain:
+        raise RobotError(
+            f"robot '{robot.name}' branches; a Denavit-Hartenberg table is of a chain: load it with the joints of one "
+            "arm"
+        )
     axes, points, T_tool = _lines(robot)
     z = axes[0]
     base = np.asarray(robot.base_position)

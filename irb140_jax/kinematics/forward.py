@@ -47,10 +47,10 @@ def link_frames(robot: Robot, q: Joints) -> tuple[Float[Array, "n 3 3"], Float[A
     Returns:
         Rotations, shape (n, 3, 3), and origins [m], shape (n, 3), in base axes.
     """
-    R, p = jnp.eye(3), jnp.zeros(3)
-    rotations, origins = [], []
+    rotations, origins = [jnp.eye(3)], [jnp.zeros(3)]  # of the base, then the links
     travel = q - robot.reference
     for i in range(robot.n):
+        R, p = rotations[robot.parent[i] + 1], origins[robot.parent[i] + 1]
         p = p + _apply(R, robot.position[i])
         R = _multiply(R, robot.rotation[i])
         if robot.is_slide[i]:
@@ -59,7 +59,7 @@ def link_frames(robot: Robot, q: Joints) -> tuple[Float[Array, "n 3 3"], Float[A
             R = _multiply(R, axis_rotation(robot.axis[i], travel[i]))
         rotations.append(R)
         origins.append(p)
-    return jnp.stack(rotations), jnp.stack(origins)
+    return jnp.stack(rotations[1:]), jnp.stack(origins[1:])
 
 
 def link_poses(robot: Robot, q: Joints) -> Float[Array, "n 4 4"]:

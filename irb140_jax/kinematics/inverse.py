@@ -182,7 +182,7 @@ def rotation_vector(R: Mat3) -> Vec3:
 
 def _refuse_other_builds(robot: Robot) -> None:
     """Raise unless the robot is of the IRB 140's build."""
-    whole = robot.n == 6 and not any(robot.is_slide)
+    whole = robot.n == 6 and robot.is_chain and not any(robot.is_slide)
     if whole:
         with jax.ensure_compile_time_eval():
             rotation, axis, position = (np.asarray(x) for x in (robot.rotation, robot.axis, robot.position))

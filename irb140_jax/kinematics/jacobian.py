@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from irb140_jax.kinematics.forward import link_frames
 from irb140_jax.robot import Robot
+from irb140_jax.robot.tree import moves
 from irb140_jax.types import Joints
 
 
@@ -49,6 +50,8 @@ def jacobian(robot: Robot, q: Joints) -> Float[Array, "6 n"]:
     slide = np.array(robot.is_slide)[:, None]
     linear = jnp.where(slide, axis, cross(axis, tool - origin))
     angular = jnp.where(slide, 0.0, axis)
+    if not robot.is_chain:  # joints of other branches don't move the tool
+        linear, angular = (jnp.where(moves(robot.parent)[-1][:, None], x, 0.0) for x in (linear, angular))
     return jnp.concatenate([robot.base_rotation @ linear.T, robot.base_rotation @ angular.T])
 
 
@@ -70,7 +73,7 @@ def joint_velocities(robot: Robot, q: Joints, twist: Float[Array, " 6"]) -> Join
 
 
 def link_jacobians(robot: Robot, q: Joints) -> LinkJacobians:
-    """Jacobians of the links' centres of mass: z_j x (p_ci - p_j) and z_j for j <= i, else 0.
+    """Jacobians of the links' centres of mass: z_j x (p_ci - p_j) and z_j where joint j moves link i, else 0.
 
     Args:
         robot: Arm with n joints.
@@ -107,4 +110,4 @@ def _rotate(rotation: Float[Array, "n 3 3"], v: Float[Array, "n 3"]) -> Float[Ar
 
 def _masks(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Whether joint j moves link i, shape (n, n, 1), and whether joint j is a slide, shape (1, n, 1)."""
-    return np.tri(robot.n, dtype=bool)[:, :, None], np.array(robot.is_slide)[None, :, None]
+    return moves(robot.parent)[:, :, None], np.array(robot.is_slide)[None, :, None]

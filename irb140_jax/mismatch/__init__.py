@@ -12,6 +12,6 @@ from irb140_jax.mismatch.model import predict as predict
 from irb140_jax.mismatch.model import prediction_times as prediction_times
 from irb140_jax.mismatch.store import load_corrected as load_corrected
 from irb140_jax.mismatch.store import load_model as load_model
+from irb140_jax.mismatch.store import load_undecided as load_undecided
 from irb140_jax.mismatch.store import save as save
 from irb140_jax.mismatch.undecided import Undecided as Undecided
-from irb140_jax.mismatch.undecided import load_undecided as load_undecided

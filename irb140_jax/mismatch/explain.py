@@ -69,6 +69,8 @@ def explain(
         progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
         both = zip(along, loads, strict=True)
         rows = [stretch(lib, r, i, band, factor, load, at) for i, (r, load) in enumerate(both)]
+        if at and not all(np.isfinite(r.y).all() and np.isfinite(r.X).all() for r in rows):
+            return explained_at(None, turn, blocks)  # an explanation without bounds is nothing to start from
         data = assemble(lib, rows, uncertainty)
         progress(f"searching sets of explanations (round {turn})")
         return _settled(lib, scales, data, factor, chosen, noise, blocks, settled=turn > 1)

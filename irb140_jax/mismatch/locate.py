@@ -11,7 +11,9 @@ from irb140_jax.robot import Robot
 
 BINS = 14  # a side of the heat maps
 FEW = 4  # rows below which a bin stays empty
-TRACE_POINTS = 900  # more than a figure can show
+TRACE_POINTS = 900  # of a joint along a recording: more than a figure can show
+FEWEST_POINTS = 150  # below which a motion of half a minute can't be recognised
+MOST_NUMBERS = 30_000  # points of all joints and recordings together: some 1.5 MB in the report
 
 
 def heat_map(q: np.ndarray, qd: np.ndarray, edges: tuple[np.ndarray, np.ndarray], r: np.ndarray) -> list[list]:
@@ -46,18 +48,23 @@ def maps(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Any]:
     return out
 
 
-def traces(robot: Robot, ex: Explanation, proof: HeldOut, names: list[str]) -> dict[str, Any]:
-    """Measured and modelled torque of each joint on data the fit did not see, from the liveliest recording."""
-    out = {}
-    for j, name in enumerate(robot.joint_names):
-        r = int(np.argmax([np.mean(s.qd[:, j] ** 2) for s in ex.data.stretches]))
-        s = ex.data.stretches[r]
-        rows = slice(0, None, max(1, len(s.t) // TRACE_POINTS))
-        measured = s.tau[rows, j]
-        out[name] = {
-            "recording": names[r], "t": s.t[rows].tolist(), "measured": measured.tolist(),
-            **{k: (measured - getattr(proof, k)[r][rows, j]).tolist() for k in ("nominal", "refit", "corrected")},
-        }  # fmt: skip
+def motions(robot: Robot, ex: Explanation, proof: HeldOut, names: list[str]) -> list[dict[str, Any]]:
+    """Position, speed, measured and modelled torque of every joint along every recording, on data the fit did not see.
+
+    Thinned evenly, so that a report of many recordings and joints stays a file that opens at once.
+    """
+    points = int(np.clip(MOST_NUMBERS / (len(names) * robot.n), FEWEST_POINTS, TRACE_POINTS))
+    out = []
+    for r, (source, s) in enumerate(zip(names, ex.data.stretches, strict=True)):
+        rows = slice(0, None, -(-len(s.t) // points))
+        joints = {}
+        for j, name in enumerate(robot.joint_names):
+            measured = s.tau[rows, j]
+            joints[name] = {
+                "q": s.q[rows, j].tolist(), "qd": s.qd[rows, j].tolist(), "measured": measured.tolist(),
+                **{k: (measured - getattr(proof, k)[r][rows, j]).tolist() for k in ("nominal", "refit", "corrected")},
+            }  # fmt: skip
+        out.append({"recording": source, "t": s.t[rows].tolist(), "joints": joints})
     return out
 
 

@@ -20,6 +20,8 @@ from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot, with_phi
 
+SCHEMA = 1  # of model.json
+
 
 @dataclasses.dataclass(frozen=True)
 class Named:
@@ -209,10 +211,10 @@ def to_json(model: CorrectedModel) -> dict[str, Any]:
     leaves = {f.name: np.asarray(getattr(arrays, f.name)).tolist() for f in dataclasses.fields(Robot)
               if eqx.is_array(getattr(arrays, f.name))}  # fmt: skip
     return {
-        "schema": 1,
+        "schema": SCHEMA,
         "robot": {
             "leaves": _finite(leaves), "joint_names": static.joint_names, "is_slide": static.is_slide,
-            "name": static.name,
+            "name": static.name, "parent": static.parent,
         },
         "phi_refit": model.phi_refit.tolist(),
         "phi_corrected": model.phi_corrected.tolist(),
@@ -236,7 +238,8 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
     return CorrectedModel(
         Robot(
             **leaves,  # pyright: ignore[reportArgumentType]: arrays only, static fields are named below
- joint_names=tuple(robot["joint_names"]), is_slide=tuple(robot["is_slide"]), name=robot["name"]
+ joint_names=tuple(robot["joint_names"]), is_slide=tuple(robot["is_slide"]), name=robot["name"],
+            parent=tuple(robot.get("parent", ())),
         ),
         np.array(data["phi_refit"]),
         np.array(data["phi_corrected"]),

@@ -1,5 +1,7 @@
 """What effects see of the rigid body, differentiated where they ask for it and not otherwise."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -8,9 +10,10 @@ from jaxtyping import Array, Float
 from irb140_jax import kinematics
 from irb140_jax.dynamics.chain import Plan, chain
 from irb140_jax.dynamics.newton_euler import rigid_torque
-from irb140_jax.dynamics.regressor import regressor_blocks
+from irb140_jax.dynamics.regressor import all_rows, regressor_blocks
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.robot import Robot, about_origin
+from irb140_jax.robot.tree import path
 from irb140_jax.types import Joints, JointSamples, Scalar
 
 
@@ -33,7 +36,7 @@ class Sensitivities(eqx.Module):
     def by_gravity(self) -> Float[Array, "T n 3"]:
         """Torque per unit of each component of gravity in base axes."""
         # The plan's last three numbers are gravity, whose zeros are none here.
-        unknown = Plan((*self.ahead.known[:-3], None, None, None), self.ahead.regroup, self.ahead.is_slide)
+        unknown = dataclasses.replace(self.ahead, known=(*self.ahead.known[:-3], None, None, None))
         still = jnp.zeros_like(self.q).T
 
         def torque(gravity):
@@ -56,6 +59,7 @@ class Sensitivities(eqx.Module):
     def held(self) -> Float[Array, "T n 10"]:
         """Torque per inertial parameter of a body held by the last link, about the tool."""
         block = regressor_blocks(chain(self.robot, self.ahead), self.q.T, self.qd.T, self.qdd.T)[-1]
+        block = all_rows(block, path(self.robot.parent, self.robot.n - 1), self.robot.n)
         return jnp.moveaxis(block, -1, 0) @ about_origin(self.robot.tool_position)
 
     @property

@@ -3,12 +3,15 @@
 import json
 import pathlib
 
-from irb140_jax.errors import InputError
+import numpy as np
+
+from irb140_jax.mismatch import undecided
 from irb140_jax.mismatch.corrected import CorrectedRobot, corrected_robot
 from irb140_jax.mismatch.diagnose import Result
-from irb140_jax.mismatch.model import CorrectedModel, from_json, to_json
+from irb140_jax.mismatch.intact import check_model, check_schema, check_undecided, refuse
+from irb140_jax.mismatch.model import SCHEMA, CorrectedModel, from_json, to_json
 from irb140_jax.mismatch.native import save_native
-from irb140_jax.mismatch.undecided import save_undecided
+from irb140_jax.mismatch.undecided import Undecided, save_undecided
 
 DIAGNOSIS, MODEL, VIEWS = "diagnosis.json", "model.json", "views.json"
 
@@ -26,15 +29,34 @@ def load_model(folder: str | pathlib.Path) -> CorrectedModel:
     """Read the corrected model of a diagnosis.
 
     Raises:
-        InputError: The folder holds no readable diagnosis.
+        InputError: The folder holds no whole diagnosis of this version.
     """
     path = pathlib.Path(folder) / MODEL
     try:
-        return from_json(json.loads(path.read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        raise InputError(f"{folder}: holds no {MODEL}; name a folder that `irb140 diagnose` has written") from None
-    except (ValueError, KeyError, TypeError, OSError) as error:
-        raise InputError(f"{path}: can't be read as a diagnosed model ({error}); diagnose again") from error
+        data = json.loads(path.read_text(encoding="utf-8"))
+        check_schema(data, SCHEMA)
+        check_model(model := from_json(data))
+        return model
+    except Exception as error:
+        refuse(path, error)
+
+
+def load_undecided(folder: str | pathlib.Path) -> Undecided:
+    """Read what a diagnosis left open.
+
+    Raises:
+        InputError: The folder holds no whole diagnosis of this version.
+    """
+    path = pathlib.Path(folder) / undecided.FILE
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+        meta = json.loads(str(arrays.pop("meta")))
+        check_schema(meta, undecided.SCHEMA)
+        check_undecided(open_ := undecided.from_arrays(meta, arrays))
+        return open_
+    except Exception as error:
+        refuse(path, error)
 
 
 def load_corrected(folder: str | pathlib.Path) -> CorrectedRobot:

@@ -10,14 +10,13 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.errors import InputError
 from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.explanation import Explanation
 from irb140_jax.mismatch.testable import REFERENCE_SHARE, VISIBLE, Reference, Site
 from irb140_jax.recordings.low_pass import Band
 
-FILE = "undecided.npz"
+FILE, SCHEMA = "undecided.npz", 1
 UNKNOWN_NOISE = 0.01  # of a joint's torque on a lively motion: what current sensors of arms have
 Sets = tuple[tuple[int, ...], ...]
 
@@ -210,7 +209,7 @@ def _rival(ex: Explanation, at: int, slug: str, loose: tuple[int, ...]) -> tuple
 def save_undecided(open_: Undecided, folder: pathlib.Path) -> None:
     """Write into an existing folder."""
     meta = {
-        "schema": 1, "columns": [dataclasses.asdict(c) for c in open_.columns], "chosen": open_.chosen,
+        "schema": SCHEMA, "columns": [dataclasses.asdict(c) for c in open_.columns], "chosen": open_.chosen,
         "loose": open_.loose, "pairs": [dataclasses.asdict(p) for p in open_.pairs], "hidden": open_.hidden,
         "uncertainty": open_.uncertainty, "band": dataclasses.asdict(open_.band), "duration": open_.scales.duration,
     }  # fmt: skip
@@ -221,28 +220,17 @@ def save_undecided(open_: Undecided, folder: pathlib.Path) -> None:
     )  # fmt: skip
 
 
-def load_undecided(folder: str | pathlib.Path) -> Undecided:
-    """Read what a diagnosis left open.
-
-    Raises:
-        InputError: The folder holds no readable diagnosis.
-    """
-    path = pathlib.Path(folder) / FILE
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
-        meta = json.loads(str(arrays.pop("meta")))
-        sizes = {k: arrays.pop(k) for k in Scales._fields if k != "duration"}
-        return Undecided(
-            columns=tuple(Column(**{k: _tuples(v) for k, v in c.items()}) for c in meta["columns"]),
-            pairs=tuple(Pair(**{k: _tuples(v) for k, v in p.items()}) for p in meta["pairs"]),
-            **{k: _tuples(meta[k]) for k in ("chosen", "loose", "hidden")}, uncertainty=meta["uncertainty"],
-            band=Band(**meta["band"]), scales=Scales(duration=meta["duration"], **sizes), **arrays,
-        )  # fmt: skip
-    except FileNotFoundError:
-        raise InputError(f"{folder}: holds no {FILE}; name a folder that `irb140 diagnose` has written") from None
-    except (ValueError, KeyError, TypeError, OSError) as error:
-        raise InputError(f"{path}: can't be read ({error}); diagnose again") from error
+def from_arrays(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Undecided:
+    """The inverse of `save_undecided`, of what its file holds."""
+    sizes = {k: arrays[k] for k in Scales._fields if k != "duration"}
+    return Undecided(
+        columns=tuple(Column(**{k: _tuples(v) for k, v in c.items()}) for c in meta["columns"]),
+        pairs=tuple(Pair(**{k: _tuples(v) for k, v in p.items()}) for p in meta["pairs"]),
+        chosen=_tuples(meta["chosen"]), loose=_tuples(meta["loose"]), hidden=_tuples(meta["hidden"]),
+        gram=arrays["gram"], scale=arrays["scale"], reference=arrays["reference"], uncertainty=meta["uncertainty"],
+        ar=arrays["ar"], level=arrays["level"], band=Band(**meta["band"]),
+        scales=Scales(duration=meta["duration"], **sizes),
+    )  # fmt: skip
 
 
 def _tuples(x: Any) -> Any:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from irb140_jax.errors import RecordingError
+from irb140_jax.recordings.channels import with_lost_torque_marked
 from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.repair import longest_run
@@ -84,8 +85,8 @@ def check_motion(recording: Recording, seen: Glance, robot: Robot) -> Recording:
         The recording with notes added.
 
     Raises:
-        RecordingError: Nothing moves, a moving joint's torque is constant, or logged speeds belong to another unit,
-            sign or joint than the positions.
+        RecordingError: Nothing moves, no moving joint has a torque that changes, or logged speeds belong to another
+            unit, sign or joint than the positions.
     """
     least = lambda pair: np.where(robot.is_slide, pair[1], pair[0])  # noqa: E731
     names, source = recording.joint_names, recording.source
@@ -94,11 +95,14 @@ def check_motion(recording: Recording, seen: Glance, robot: Robot) -> Recording:
                              "record a motion, or map the columns that hold the measured positions with --columns "
                              "FILE.toml")
     moving = seen.travel > least(MOVING)
-    for j in np.flatnonzero(moving & recording.has_torque):
-        if np.ptp(recording.tau[:, j]) == 0:
-            raise RecordingError(f"{source}: column tau.{names[j]} is {recording.tau[0, j]:g} in every row, though the "
-                                 f"joint moves by {seen.travel[j]:.3g}: a dead channel; log the motor torque or "
-                                 "current of this joint, or map the column that holds it with --columns FILE.toml")
+    if recording.has_torque:
+        recording = with_lost_torque_marked(recording, least(MOVING))
+        lost = recording.torque_lost
+        if lost is not None and np.all(lost.all(axis=0) | ~moving):
+            raise RecordingError(f"{source}: no moving joint has a torque that changes: columns "
+                                 f"{', '.join('tau.' + names[j] for j in np.flatnonzero(moving))} are dead channels; "
+                                 "log motor torques or currents, or map the columns that hold them with --columns "
+                                 "FILE.toml")
     if seen.logged_qd is not None:
         _check_derivative(recording, seen.qd, seen.logged_qd, moving, ("qd", "q"))
     if seen.logged_qdd is not None:

@@ -4,64 +4,49 @@ The model is allowed to be wrong, that is what the program is for: half the mass
 tilted base, a payload.  So only what no physics could bring about is refused, and doubt passes.
 """
 
-from typing import NamedTuple
+import dataclasses
 
-import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import linear_sum_assignment, nnls
 
-from irb140_jax.dynamics import inverse_dynamics_batch
 from irb140_jax.errors import RecordingError
+from irb140_jax.recordings.channels import channel_doubts, lateness
 from irb140_jax.recordings.check import MOVING
 from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.torques import Torques, nominal_torques
 from irb140_jax.robot import Robot
 
 FAR = 20.0  # rad; three turns: beyond the reach of any joint that has limits
 CERTAIN, NONE = 0.7, 0.15  # shares of a torque's variance that count as explained and as not explained
 MIN_SHARE = 0.4  # of the model's torque that a joint must log to have a sign or a place worth judging
-TOO_SMALL, TOO_LARGE = 1 / 20, 20.0  # torque over the model's torque that no payload or friction explains
 
 
-class Torques(NamedTuple):
-    """What the nominal model says of a motion: shape (SAMPLES, n) each, [N m or N].
+def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Recording:
+    """Refuse a recording whose positions are in degrees or whose channels have a wrong unit, sign, zero or joint.
 
-    Attributes:
-        gravity: Torque at rest in the same poses.
-        moving: What motion adds to it.
-    """
-
-    gravity: np.ndarray
-    moving: np.ndarray
-
-    @property
-    def total(self) -> np.ndarray:
-        return self.gravity + self.moving
-
-
-def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> None:
-    """Refuse a recording whose positions are in degrees or whose torque has a wrong unit, sign or joint.
+    Returns:
+        The recording, with a note where a torque comes so late that it looks reversed.
 
     Raises:
         RecordingError: The nominal model says so beyond doubt.
     """
     hinge = ~np.asarray(robot.is_slide)
-    moving = seen.travel > np.where(hinge, MOVING[0], MOVING[1])
+    living = True if recording.torque_lost is None else ~recording.torque_lost.any(axis=0)
+    moving = (seen.travel > np.where(hinge, *MOVING)) & living
     model = nominal_torques(robot, seen.q, seen.qd, seen.qdd)
     _check_angles(recording, seen, robot, model, moving & hinge)
     # A joint that is carried along unpowered logs a little of anything, even drag of the wrong sign.
     driven = moving & (np.std(seen.tau, axis=0) > MIN_SHARE * np.std(model.total, axis=0))
-    _check_order(recording, seen, model, moving)
-    _check_sign(recording, seen, model, driven)
-    _check_scale(recording, seen, model, moving)
-
-
-def nominal_torques(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> Torques:
-    """Gravity and motion torque of the nominal model along a motion, arrays of shape (SAMPLES, n)."""
-    at, still = jnp.asarray(q), jnp.zeros(q.shape)
-    gravity = np.asarray(inverse_dynamics_batch(robot, at, still, still))
-    total = np.asarray(inverse_dynamics_batch(robot, at, jnp.asarray(qd), jnp.asarray(qdd)))
-    return Torques(gravity, total - gravity)
+    late = {int(j): lateness(recording, seen, model, int(j)) for j in _reversed(seen, model, driven)}
+    on_time = moving & ~np.isin(np.arange(robot.n), [j for j, delay in late.items() if delay > 0.0])
+    _check_order(recording, seen, model, on_time)
+    _check_sign(recording, seen, model, driven & on_time)
+    for doubt in channel_doubts(recording, seen, robot, on_time, driven):
+        raise RecordingError(f"{recording.source}: {doubt.said}: {doubt.remedy}")
+    said = [f"tau.{recording.joint_names[j]} comes about {1000 * delay:.0f} ms after what the model needs: a drive "
+            "that lags, or channels out of step" for j, delay in late.items() if delay > 0.0]  # fmt: skip
+    return dataclasses.replace(recording, notes=(*recording.notes, *said))
 
 
 def explained_shares(seen: Glance, model: Torques) -> np.ndarray:
@@ -71,7 +56,7 @@ def explained_shares(seen: Glance, model: Torques) -> np.ndarray:
     """
     n = seen.q.shape[1]
     centred = lambda x: x - x.mean(axis=0)  # noqa: E731
-    features = [np.stack([model.gravity[:, j], model.moving[:, j], *_own_motion(seen, j)], axis=1) for j in range(n)]
+    features = [np.stack([model.gravity[:, j], model.moving[:, j], *own_motion(seen, j)], axis=1) for j in range(n)]
     targets = centred(seen.tau)
     return np.array([[_non_negative_share(centred(features[j]), targets[:, k]) for k in range(n)] for j in range(n)])
 
@@ -93,12 +78,12 @@ def motion_shares(seen: Glance, model: Torques) -> tuple[np.ndarray, np.ndarray]
     targets, shares = left(seen.tau), np.zeros((2, n))
     for j in range(n):
         if np.var(targets[:, j]) > 0.05 * np.var(seen.tau[:, j]):
-            features = left(np.stack([model.moving[:, j], *_own_motion(seen, j)], axis=1))
+            features = left(np.stack([model.moving[:, j], *own_motion(seen, j)], axis=1))
             shares[:, j] = [_non_negative_share(features, sign * targets[:, j]) for sign in (1, -1)]
     return shares[0], shares[1]
 
 
-def _own_motion(seen: Glance, j: int) -> tuple[np.ndarray, ...]:
+def own_motion(seen: Glance, j: int) -> tuple[np.ndarray, ...]:
     """Viscous friction, dry friction and rotor inertia of joint j, to scale."""
     slow = 0.02 * np.abs(seen.qd[:, j]).max() + 1e-12
     return seen.qd[:, j], np.tanh(seen.qd[:, j] / slow), seen.qdd[:, j]
@@ -141,14 +126,19 @@ def _check_angles(recording: Recording, seen: Glance, robot: Robot, model: Torqu
                              f"{given:.1f} times what is logged, in degrees by {degrees:.1f} times; {remedy}")
 
 
-def _check_sign(recording: Recording, seen: Glance, model: Torques, driven: np.ndarray) -> None:
+def _reversed(seen: Glance, model: Torques, driven: np.ndarray) -> np.ndarray:
+    """Driven joints whose torque would fit with the sign reversed, and does not as it is."""
     right, wrong = motion_shares(seen, model)
     # Where that says little, the reversed torque itself must fit, on a joint where a payload could not turn it round:
     # one that carries much of the arm, or one that gravity hardly touches.
     size = np.std(model.total, axis=0)
     sure = (size > 0.1 * size.max()) | (np.std(model.moving, axis=0) > 2 * np.std(model.gravity, axis=0))
     fits = sure & (_misfit(-seen.tau, model.total) < 0.35) & (_misfit(seen.tau, model.total) > 1.5)
-    reversed_ = np.flatnonzero(driven & ((wrong > CERTAIN) & (right < NONE) | fits))
+    return np.flatnonzero(driven & ((wrong > CERTAIN) & (right < NONE) | fits))
+
+
+def _check_sign(recording: Recording, seen: Glance, model: Torques, driven: np.ndarray) -> None:
+    reversed_ = _reversed(seen, model, driven)
     if len(reversed_):
         names = [recording.joint_names[j] for j in reversed_]
         raise RecordingError(f"{recording.source}: column{'s' if len(names) > 1 else ''} "
@@ -175,21 +165,6 @@ def _check_order(recording: Recording, seen: Glance, model: Torques, moving: np.
             text = ", ".join(f"tau.{names[best[j]]} fits joint {names[j]}" for j in pairs)
             raise RecordingError(f"{recording.source}: torque columns look exchanged: {text}; put the columns in "
                                  "order, or exchange them with --columns FILE.toml")
-
-
-def _check_scale(recording: Recording, seen: Glance, model: Torques, moving: np.ndarray) -> None:
-    """Torque in another unit or on the motor side: it follows the model on every joint, and is far too small or "
-      "large."""
-    follows = [j for j in np.flatnonzero(moving) if np.var(model.total[:, j]) > 0 and np.var(seen.tau[:, j]) > 0
-               and np.corrcoef(model.total[:, j], seen.tau[:, j])[0, 1] > 0.9]
-    ratios = [float(np.std(seen.tau[:, j]) / np.std(model.total[:, j])) for j in follows]
-    # A joint alone may carry a load many times what the model gives it; most of them can't.
-    if 2 * len(follows) > moving.sum() and (max(ratios) < TOO_SMALL or min(ratios) > TOO_LARGE):
-        j = follows[int(np.argmax(ratios))]
-        raise RecordingError(f"{recording.source}: column tau.{recording.joint_names[j]} has the shape of the model's "
-                             f"torque but is {max(ratios):.3g} times as large, and no other joint fits better; N m on "
-                             "the joint side are wanted: multiply motor torque by the gear ratio, current by the "
-                             "torque constant too, with --columns and [scale]")
 
 
 def _misfit(tau: np.ndarray, model: np.ndarray) -> np.ndarray:

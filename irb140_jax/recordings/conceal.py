@@ -85,7 +85,7 @@ class ConcealedCase:
         robot_source: The nominal model: path of an MJCF file, or MJCF text.
         truth: What was hidden: effects, joints, parameters with units, shares; how much of each joint's torque is
             left out by the true rigid arm in the end (`left_out`); true masses.
-        seal: SHA-256 of the truth, fit to be published before the diagnosis.
+        seal: SHA-256 of its effects and their parameters, fit to be published before the diagnosis (see `sealed`).
         secret: What a judge may look at besides.
     """
 
@@ -213,9 +213,23 @@ def left_out_share(rigid: mujoco.MjModel, logs: Sequence[Log], every: int = 1) -
     return np.sqrt(squares / np.maximum(rigid_squares, 1e-300))
 
 
+def sealed(truth: dict) -> str:
+    """What a seal covers, as text: seed and effects with joints and parameters, to four digits.
+
+    What was simulated or summed stays outside: its last digits are another processor's or library's own, and with
+    them the seal would be, too.
+    """
+    parameters = lambda effect: {  # noqa: E731
+        name: f"{given['value'] + 0.0:.4g} {given['unit']}".strip() for name, given in effect["parameters"].items()
+    }
+    effects = [{"effect": e["effect"], "joints": list(e["joints"]), "parameters": parameters(e)}
+               for e in truth["effects"]]  # fmt: skip
+    return json.dumps({"seed": truth["seed"], "effects": effects}, sort_keys=True, separators=(",", ":"))
+
+
 def seal(truth: dict) -> str:
-    """SHA-256 of the truth, written as JSON with sorted keys."""
-    return hashlib.sha256(json.dumps(truth, sort_keys=True).encode()).hexdigest()
+    """SHA-256 of what is sealed of the truth."""
+    return hashlib.sha256(sealed(truth).encode()).hexdigest()
 
 
 def _irb140_case(seed: int, duration: float, rate: float, *, clean: bool) -> ConcealedCase:

@@ -43,6 +43,9 @@ class Conditioned:
         unsure: Standard deviation of the low-passed torque that the samples leave open, shape (T, n): see `_between`.
         notes: Repairs, as sentences.
         began: Time of the log's first row [s]; the smoother leaves out the first samples.
+        motion: Number of the motion, the same for recordings of one programme; -1: its own.
+        repeats: How many recordings there are of that motion.
+        shaken: Standard deviation of what encoder noise leaves in qdd [rad/s^2 or m/s^2], shape (n,).
     """
 
     source: str
@@ -58,6 +61,9 @@ class Conditioned:
     unsure: np.ndarray
     notes: tuple[str, ...]
     began: float = 0.0
+    shaken: np.ndarray | None = None
+    motion: int = -1
+    repeats: int = 1
 
 
 def choose_band(recordings: list[Recording], robot: Robot) -> Band:
@@ -79,7 +85,7 @@ def choose_band(recordings: list[Recording], robot: Robot) -> Band:
     slowest = float(min(rates))
     highest = max(min(MAX_TORQUE_BAND, slowest / 6.0), 1.0)
     band = _band(float(np.clip(2.0 * limit, min(MIN_TORQUE_BAND, highest), highest)), slowest)
-    coherent = _coherent_limit([condition(r, band) for r in recordings], robot, band)
+    coherent = _coherent_limit(recordings, robot, band)
     return _band(max(min(band.torque, coherent), min(MIN_TORQUE_BAND, highest)), slowest)
 
 
@@ -89,24 +95,27 @@ def _band(torque: float, rate: float) -> Band:
     return Band(torque, min(1.6 * torque, 0.4 * rate), working, max(1, int(working / (2.2 * torque))))
 
 
-def _coherent_limit(smooth: list["Conditioned"], robot: Robot, band: Band) -> float:
+def _coherent_limit(recordings: list[Recording], robot: Robot, band: Band) -> float:
     """Highest frequency [Hz] up to which the model's torque is not filled with what the log and friction don't show.
 
     Of the model's torque m, the part incoherent with the logged torque and the direction of motion is summed from
     `SLOW` upwards; it must stay below `INCOHERENT` of the whole power, for every joint.  What friction a regression
     below `SLOW` finds is taken off the logged torque first: where friction rules, m and the log would not match at all.
     """
+    smooth = [condition(r, band) for r in recordings]
     window = int(band.rate)  # one second: resolves 1 Hz
+    living = np.stack([np.ones(robot.n, dtype=bool) if r.torque_lost is None else ~r.torque_lost.any(axis=0)
+                       for r in recordings])  # fmt: skip
     f = np.fft.rfftfreq(window, 1.0 / band.rate)
     spectra = np.zeros((robot.n, len(f), 4, 4), dtype=complex)
     taper = np.hanning(window)[:, None]
     passive = lambda r: (r.stiffness, r.damping, r.frictionloss)  # noqa: E731
     moving = eqx.tree_at(passive, robot, (jnp.zeros(robot.n),) * 3)
-    for r in smooth:
+    for r, alive in zip(smooth, living, strict=True):
         m = np.asarray(dynamics.inverse_dynamics_batch(moving, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
         friction = np.concatenate([r.direction, r.qd], axis=1)
         slow = filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), kernels(SLOW, band.rate)[0])
-        for j in range(robot.n):
+        for j in np.flatnonzero(alive):
             inputs = np.concatenate([slow[:, [robot.n + j, 2 * robot.n + j]], slow[:, 3 * robot.n :]], axis=1)
             inputs = np.concatenate([inputs, np.ones((len(inputs), 1))], axis=1)
             w = np.linalg.lstsq(inputs, slow[:, j], rcond=1e-6)[0]
@@ -169,7 +178,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     unsure = _between(tau, band, raw_rate)
     anti_alias = kernels(min(0.4 * band.rate, 0.45 * raw_rate), raw_rate)[0]
     white = white_density(recording, raw_rate)
-    q, speed_noise = without_noise(q, white, raw_rate, h1, resampled=t is not recording.t)
+    q, (speed_noise, shaken) = without_noise(q, white, raw_rate, (h1, h2), resampled=t is not recording.t)
     smoothed = [convolved(q, k) for k in (h, h1, h2)]
     tau = filtered(tau, anti_alias)
     keep = slice(None) if pad else slice(half, len(t) - half)
@@ -183,13 +192,22 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     # A gap spoils what the smoother and, later, the low-pass reach from it; half their length holds most of that.
     reach = (int(np.ceil(half / raw_rate * band.rate)) + (len(band.low_pass()) - 1) // 2) // 2
     lost = ndimage.maximum_filter1d((np.interp(grid, t, missing.astype(float)) > 0).astype(int), 2 * reach + 1) > 0
+    frozen = _lost_torque(recording, grid, reach)
     notes = list(recording.notes)
     if spikes:
         notes.append(f"{spikes} torque spikes were replaced by the median of their neighbours")
-    usable, began = ~resting & ~lost[:, None], float(recording.t[0])
+    usable, began = ~resting & ~lost[:, None] & ~frozen, float(recording.t[0])
     moving = (recording.source, grid, q, qd, qdd, tau, usable)
     q_noise = np.sqrt(0.5 * raw_rate * white)
-    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began)
+    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken)
+
+
+def _lost_torque(recording: Recording, grid: np.ndarray, reach: int) -> np.ndarray:
+    """Where a torque channel is dead or frozen, and what the filters spread of it, shape (len(grid), n)."""
+    if recording.torque_lost is None:
+        return np.zeros((len(grid), recording.tau.shape[1]), dtype=bool)
+    lost = _at(grid, recording.t, recording.torque_lost.astype(float)) > 0.0
+    return ndimage.maximum_filter1d(lost.astype(np.uint8), 2 * reach + 1, axis=0) > 0
 
 
 def _between(tau: np.ndarray, band: Band, rate: float) -> np.ndarray:

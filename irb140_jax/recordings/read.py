@@ -1,8 +1,8 @@
 """A file to a checked `Recording`: the way in for everything a user measured."""
 
 import dataclasses
-import hashlib
 import pathlib
+import re
 from typing import Literal
 
 import numpy as np
@@ -11,10 +11,14 @@ from irb140_jax.errors import RecordingError
 from irb140_jax.recordings import repair
 from irb140_jax.recordings.check import check_motion, check_times
 from irb140_jax.recordings.check_model import check_against_model
-from irb140_jax.recordings.columns import ColumnMap, closest, read_column_map, renamed, scaled, what_came
+from irb140_jax.recordings.column_file import read_column_map
+from irb140_jax.recordings.columns import ColumnMap, closest, renamed, scaled, what_came
+from irb140_jax.recordings.formats.opened import checksum
 from irb140_jax.recordings.glance import glance
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.table import read_table
+from irb140_jax.recordings.times import seconds_of_text, seconds_since_start
+from irb140_jax.recordings.units import stated_unit
 from irb140_jax.robot import Robot
 
 
@@ -22,12 +26,12 @@ def read_recording(
     path: str | pathlib.Path, robot: Robot, columns: str | pathlib.Path | None = None, *,
     torque: Literal["required", "optional"] = "required",
 ) -> Recording:
-    """Read a recording of this robot from CSV, Parquet or NPZ and check it.
+    """Read a recording of this robot, in any format of `recordings.table`, and check it.
 
     Args:
         path: The file; its columns are t, q.<joint>, tau.<joint> and where logged qd.<joint>, qdd.<joint>, SI units.
         robot: The model of the robot that was recorded; gives the joints' names and what torque is plausible.
-        columns: A TOML file that maps other names and units, see `recordings.columns`.
+        columns: A TOML file that maps other names, units and sides, see `docs/columns.md`.
         torque: Whether columns tau.<joint> have to be there; a planned motion has none, and its `tau` is NaN.
 
     Returns:
@@ -43,8 +47,8 @@ def read_recording(
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
     if recording.has_torque:
-        check_against_model(recording, seen, robot)
-    return dataclasses.replace(recording, source=path.name, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
+        recording = check_against_model(recording, seen, robot)
+    return dataclasses.replace(recording, source=path.name, sha256=checksum(path))
 
 
 def unchecked_recording(
@@ -52,9 +56,10 @@ def unchecked_recording(
     torque: Literal["required", "optional"] = "required",
 ) -> Recording:
     """The numbers of a file as a `Recording`: complete, finite, in rising time; motion and torque are not checked."""
-    column_map = ColumnMap() if columns is None else read_column_map(columns, joint_names)
-    table, notes = read_table(path, joint_names)
-    table = renamed(table, column_map)
+    column_map = ColumnMap(source=str(path)) if columns is None else read_column_map(columns, joint_names)
+    file = read_table(path, joint_names, column_map.options)
+    table, notes = renamed(file.columns, column_map), file.notes
+    stated = _stated(table, file.units, column_map)
     # All of the torques or none: some of them missing is more likely a wrong name than a planned motion.
     has_torque = torque == "required" or any(f"tau.{joint}" in table for joint in joint_names)
     wanted = [*([] if column_map.rate and "t" not in table else ["t"]),
@@ -67,11 +72,15 @@ def unchecked_recording(
         if len(missing) < len(joint_names):
             notes.append(f"{kind} is not there for every joint ({missing[0]} is missing), so it is derived from q")
     used = [*wanted, *(name for names in complete.values() for name in names)]
-    table = scaled(_numbers(table, used, path, notes), column_map)
+    if "t" in table and table["t"].dtype == object and _as_floats(table["t"])[1] is not None:
+        table["t"] = seconds_of_text(table["t"], column_map.options.time_format, path)
+    table = scaled(_numbers(table, used, path, notes), column_map, stated, notes)
+    table["t"] = seconds_since_start(table["t"], notes)
     if "t" not in used:
         used.insert(0, "t")
+    rows = np.arange(1, len(table["t"]) + 1)
+    table, rows = _cut(table, rows, column_map)
     file_t = table["t"]
-    rows = np.arange(1, len(file_t) + 1)
     table, rows = repair.without_repeated_rows(table, rows, notes)
     table = repair.without_absurd_values(table, used)
     table, rows = repair.without_missing_ends(table, used, rows, notes)
@@ -113,10 +122,37 @@ def recorded_joints(
         RecordingError: The file or the map can't be read.
     """
     column_map = ColumnMap() if columns is None else read_column_map(columns, known_joint_names)
-    table = renamed(read_table(pathlib.Path(path), known_joint_names)[0], column_map)
+    file = read_table(pathlib.Path(path), known_joint_names, column_map.options)
+    table = renamed(file.columns, column_map)
+    _stated(table, file.units, column_map)
     moved = [joint for joint in known_joint_names if f"q.{joint}" in table]
     driven = [joint for joint in moved if f"tau.{joint}" in table]
     return tuple(driven or moved)
+
+
+def _stated(table: dict[str, np.ndarray], units: dict[str, str], column_map: ColumnMap) -> dict[str, str]:
+    """Channel -> unit by the file's own words; a name such as "q.elbow [deg]" loses its bracket in the table."""
+    for name in list(table):
+        bare = re.sub(r"\s*[\[(][^\[(]*$", "", name) if stated_unit(name) else name
+        if bare != name and bare not in table:
+            table[bare] = table.pop(name)
+            units = units | {bare: units.get(name, str(stated_unit(name)))}
+    theirs = column_map.values("columns")
+    return {name: units[str(theirs.get(name, name))] for name in table if theirs.get(name, name) in units}
+
+
+def _cut(
+    table: dict[str, np.ndarray], rows: np.ndarray, column_map: ColumnMap
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The part of the recording that the map asks for."""
+    if np.isinf(column_map.start) and np.isinf(column_map.end):
+        return table, rows
+    since = table["t"] - table["t"][np.isfinite(table["t"])][:1].sum()
+    inside = ~((since < column_map.start) | (since > column_map.end))
+    if not inside.any():
+        raise RecordingError(f"{column_map.source}: from = {column_map.start:g} to = {column_map.end:g} leaves no row; "
+                             f"the recording lasts {np.nanmax(since):.4g} s")
+    return {name: values[inside] for name, values in table.items()}, rows[inside]
 
 
 def _require(table: dict[str, np.ndarray], wanted: list[str], path: pathlib.Path) -> None:
@@ -146,6 +182,12 @@ def _numbers(
         else:
             notes.append(f"Column {name} holds text and is left out")
     return numbers
+
+
+def as_numbers(table: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[str]]:
+    """The columns that hold numbers, as floats, and a note on each that does not."""
+    notes: list[str] = []
+    return _numbers(table, [], pathlib.Path(), notes), notes
 
 
 def _as_floats(values: np.ndarray) -> tuple[np.ndarray, int | None]:

@@ -7,7 +7,7 @@ import pathlib
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from irb140_jax.errors import RecordingError
 
@@ -30,6 +30,7 @@ class Recording:
         notes: Repairs made and oddities seen, one plain sentence each.
         file_t: Time of every row of the file, those that reading left out included [s]; None where it left out none.
         sha256: Of the file it was read from; empty where it comes from none.
+        torque_lost: Rows in which a torque channel is dead or frozen, shape (T, n); None where none is.
     """
 
     t: Float[np.ndarray, " T"]
@@ -43,6 +44,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     file_t: Float[np.ndarray, " rows"] | None = None
     sha256: str = ""
+    torque_lost: Bool[np.ndarray, "T n"] | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.t), len(self.joint_names))
@@ -65,6 +67,7 @@ def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Rec
         recording, t=recording.t[rows], q=recording.q[rows], tau=recording.tau[rows], qd=cut(recording.qd),
         qdd=cut(recording.qdd), extras={k: v[rows] for k, v in recording.extras.items()},
         source=recording.source if source is None else source, file_t=None, sha256="",
+        torque_lost=cut(recording.torque_lost),
     )
 
 

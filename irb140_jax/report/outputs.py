@@ -1,12 +1,15 @@
 """Where results may go: checked before the work, so that nothing is lost by it or after it."""
 
 import contextlib
+import os
 import pathlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from irb140_jax.errors import InputError, MisplacedResultError
 from irb140_jax.report.made import DIAGNOSIS, MANIFEST, checksum, holds_a_diagnosis, read_manifest
 from irb140_jax.report.results import SCRATCH, Results, said
+
+Ours = Callable[[pathlib.Path], bool]
 
 
 @contextlib.contextmanager
@@ -39,7 +42,7 @@ def results_folder(out: pathlib.Path, command: str, inputs: Iterable[pathlib.Pat
 
 @contextlib.contextmanager
 def results_file(
-    out: pathlib.Path, ours: Callable[[pathlib.Path], bool], inputs: Iterable[pathlib.Path] = ()
+    out: pathlib.Path, ours: Ours, inputs: Iterable[pathlib.Path] = (), beside: Mapping[str, Ours] | None = None
 ) -> Iterator[Results]:
     """Room for a file, checked and taken before the work; the writer writes it by the name of `out`.
 
@@ -47,6 +50,7 @@ def results_file(
         out: The file: new, empty, or of a former run.
         ours: Whether an existing file was written by the same command, so that it may be replaced.
         inputs: Files and folders that the command reads.
+        beside: Endings of further files, each named like `out` without its own ending, with what `ours` is for them.
 
     Raises:
         InputError: Nothing can or may be written there.
@@ -55,20 +59,29 @@ def results_file(
     real = _real(out)
     if real.is_dir():
         raise InputError(f"--out {out}: this is a folder; name a file, for example {out / 'result.csv'}")
-    if any(_same(real, given) for given in inputs):
-        raise InputError(f"--out {out}: this is an input, which would be overwritten; name another file")
+    files = {real: ours} | {real.with_name(real.stem + end): own for end, own in (beside or {}).items()}
+    for path, own in files.items():
+        _check_file(out if path == real else path, path, own, inputs)
     _check_not_in(out, real, inputs)
-    if real.exists() and not _replaceable(real, ours):
-        raise InputError(
-            f"--out {out}: this file is there and is no former result of this command, so it is not overwritten; name "
-            "another file, or move it away"
-        )
-    owned = lambda folder: {real.name: checksum(real)} if real.exists() and _replaceable(real, ours) else {}  # noqa: E731
+
+    def owned(_: pathlib.Path) -> dict[str, str]:
+        return {path.name: checksum(path) for path, own in files.items() if path.exists() and _replaceable(path, own)}
+
     with _room(out, real.parent, owned, name=real.name) as results:
         yield results
 
 
-def _replaceable(path: pathlib.Path, ours: Callable[[pathlib.Path], bool]) -> bool:
+def _check_file(out: pathlib.Path, real: pathlib.Path, ours: Ours, inputs: Iterable[pathlib.Path]) -> None:
+    if any(_same(real, given) for given in inputs):
+        raise InputError(f"--out {out}: this is an input, which would be overwritten; name another file")
+    if os.path.lexists(real) and not _replaceable(real, ours):
+        raise InputError(
+            f"--out {out}: this file is there and is no former result of this command, so it is not overwritten; name "
+            "another file, or move it away"
+        )
+
+
+def _replaceable(path: pathlib.Path, ours: Ours) -> bool:
     return path.is_file() and (path.stat().st_size == 0 or ours(path))
 
 

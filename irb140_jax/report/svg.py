@@ -1,26 +1,16 @@
-"""Small drawings for the report as SVG text: heat map, colour bar, line plot.  Nothing but scaling happens here."""
+"""Lines over axes as SVG text.  Nothing but scaling happens here."""
 
+import html
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
-
-Grid = Sequence[Sequence[float | None]]
-
-# Blue to orange through a light grey: told apart by every kind of colour vision; the middle is not the page's white.
-BLUES = ((8, 69, 148), (66, 146, 198), (158, 202, 225))
-ORANGES = ((253, 190, 133), (230, 85, 13), (140, 45, 4))
-DIVERGING = (*BLUES, (236, 236, 233), *ORANGES)
-SHADES = 24  # distinct colours of a map; more can't be told apart and would only make the file longer
 
 
 class Series(NamedTuple):
     """One line of a plot."""
 
-    name: str
+    name: str  # the page's style gives every name its colour, light and dark
     y: Sequence[float | None]
-    colour: str
-    width: float = 1.4
-    dash: str = ""
 
 
 class Box(NamedTuple):
@@ -73,17 +63,10 @@ def tick_text(value: float) -> str:
     return f"{value:.6g}".replace("-", "−").replace("e−0", "e−")
 
 
-def shade(u: float) -> str:
-    """Colour of u in [-1, 1]."""
-    place = (min(max(u, -1.0), 1.0) + 1.0) / 2.0 * (len(DIVERGING) - 1)
-    i = min(int(place), len(DIVERGING) - 2)
-    rgb = (round(a + (place - i) * (b - a)) for a, b in zip(DIVERGING[i], DIVERGING[i + 1], strict=True))
-    return "#" + "".join(f"{c:02x}" for c in rgb)
-
-
 def drawing(width: float, height: float, label: str, body: str) -> str:
     """An SVG element with a name for screen readers."""
-    return f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{label}">{body}</svg>'
+    name = html.escape(label)
+    return f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{name}"><title>{name}</title>{body}</svg>'
 
 
 def text(x: float, y: float, content: str, anchor: str = "middle", extra: str = "") -> str:
@@ -113,49 +96,6 @@ def axes(
     return "".join(parts)
 
 
-def heat_map(title: str, grid: Grid, rows: Sequence[float], columns: Sequence[float], limit: float, unit: str) -> str:
-    """Mean residual over position (upwards) and speed (to the right); cells without data stay white.
-
-    Args:
-        title: Heading of the map.
-        grid: Values, one row per position bin, one column per speed bin; None where there are no data.
-        rows, columns: Edges of the bins.
-        limit: Value at which the colours are full.
-        unit: Unit of positions, rad or m.
-    """
-    box = Box(48, 20, 168, 150, (columns[0], columns[-1]), (rows[0], rows[-1]))
-    cells: dict[int, list[str]] = {}
-    for i, row in enumerate(grid):
-        top, bottom = box.py(rows[i + 1]), box.py(rows[i])
-        for j, value in enumerate(row):
-            if value is None or not math.isfinite(value):
-                continue
-            left, right = box.px(columns[j]), box.px(columns[j + 1])
-            step = round(min(max(value / limit if limit else 0.0, -1.0), 1.0) * SHADES / 2)
-            # One path per colour instead of a rectangle per cell keeps the file small.
-            cell = f"M{left:.1f} {top:.1f}H{right:.1f}V{bottom:.1f}H{left:.1f}z"
-            cells.setdefault(step, []).append(cell)
-    body = [text(box.left + box.width / 2, 12, title, extra=' class="title"')]
-    body.append(axes(box, f"speed [{unit}/s]", f"position [{unit}]"))
-    fills = (f'<path fill="{shade(2 * step / SHADES)}" d="{"".join(d)}"/>' for step, d in sorted(cells.items()))
-    body.append(f'<g shape-rendering="crispEdges">{"".join(fills)}</g>')
-    return drawing(224, 206, title, "".join(body))
-
-
-def colour_bar(limit: float, unit: str) -> str:
-    """The legend of a pair of heat maps."""
-    box = Box(6, 20, 12, 150, (0.0, 1.0), (-limit, limit))
-    height = box.height / SHADES
-    steps = range(SHADES)
-    body = "".join(
-        f'<rect x="6" y="{box.top + k * height:.1f}" width="12" height="{height + 0.5:.1f}" '
-        f'fill="{shade(1 - (2 * k + 1) / SHADES)}"/>'
-        for k in steps
-    )
-    body += "".join(text(23, box.py(v) + 3.5, tick_text(v), "start") for v in ticks(-limit, limit, 5))
-    return drawing(74, 206, f"colour scale in {unit}", body + text(6, 12, unit, "start", ' class="axis"'))
-
-
 def line_plot(
     x: Sequence[float],
     series: Sequence[Series],
@@ -164,31 +104,49 @@ def line_plot(
     size: tuple[float, float] = (540, 170),
     log_y: bool = False,
     x_ticks: bool = True,
+    name: str = "",
 ) -> str:
     """Lines over a common axis; gaps where a value is None."""
     values = [v for s in series for v in s.y if v is not None and math.isfinite(v) and (v > 0 or not log_y)]
     if not values or len(x) < 2:
         return ""
     scale = math.log10 if log_y else float
-    low, high = scale(min(values)), scale(max(values))
-    margin = 0.05 * (high - low) or 1.0
     bottom = 36 if x_ticks else 8
-    box = Box(58, 8, size[0] - 68, size[1] - 8 - bottom, (x[0], x[-1]), (low - margin, high + margin))
-    body = [axes(box, x_label, y_label, x_ticks, log_y, about=(8, 4))]
-    for s in series:
-        dash = f' stroke-dasharray="{s.dash}"' if s.dash else ""
-        path = _path(box, x, [scale(v) if v is not None and (v > 0 or not log_y) else None for v in s.y])
-        body.append(f'<path class="line" stroke="{s.colour}" stroke-width="{s.width:g}"{dash} d="{path}"/>')
-    return drawing(*size, y_label, "".join(body))
+    y = _widened(scale(min(values)), scale(max(values)))
+    box = Box(58, 8, size[0] - 68, size[1] - 8 - bottom, (x[0], x[-1]), y)
+    body = [axes(box, x_label, y_label, x_ticks, log_y, about=(8 if size[0] > 400 else 5, 4))]
+    body += [_line(box, s.name, x, [scale(v) if v is not None and (v > 0 or not log_y) else None for v in s.y])
+             for s in series]  # fmt: skip
+    return drawing(*size, name or y_label, "".join(body))
 
 
-def _path(box: Box, x: Sequence[float], y: Sequence[float | None]) -> str:
-    """Path of a line, broken where y is None."""
+def loop_plot(
+    x: Sequence[float | None], series: Sequence[Series], x_label: str, y_label: str,
+    size: tuple[float, float] = (264, 220), name: str = "",
+) -> str:  # fmt: skip
+    """Curves over a quantity that comes and goes, such as torque over position."""
+    values = [v for s in series for v in s.y if v is not None and math.isfinite(v)]
+    places = [v for v in x if v is not None and math.isfinite(v)]
+    if not values or len(places) < 2:
+        return ""
+    box = Box(58, 8, size[0] - 68, size[1] - 44, _widened(min(places), max(places)), _widened(min(values), max(values)))
+    body = [axes(box, x_label, y_label, about=(4, 5)), *(_line(box, s.name, x, s.y) for s in series)]
+    return drawing(*size, name or y_label, "".join(body))
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    """A range with a margin."""
+    margin = 0.05 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _line(box: Box, name: str, x: Sequence[float | None], y: Sequence[float | None]) -> str:
+    """Path of a line, broken where x or y is None."""
     parts, pen = [], "M"
     for a, b in zip(x, y, strict=True):
-        if b is None or not math.isfinite(b):
+        if a is None or b is None or not math.isfinite(b):
             pen = "M"
             continue
         parts.append(f"{pen}{box.px(a):.1f} {box.py(b):.1f}")
         pen = "L"
-    return "".join(parts)
+    return f'<path class="line {name}" d="{"".join(parts)}"/>'

@@ -22,12 +22,11 @@ VERDICT_COLOURS = {
 
 def print_diagnosis(diagnosis: Mapping, views: Mapping, console: Console) -> None:
     """Print verdict, findings and fit of a diagnosis; the views give the units of the joints' torque."""
-    title, sentence = text.VERDICTS.get(diagnosis["verdict"], (text.words(diagnosis["verdict"]), ""))
+    title = text.VERDICTS.get(diagnosis["verdict"], text.words(diagnosis["verdict"]))
     colour = VERDICT_COLOURS.get(diagnosis["verdict"], "default")
     joints = list(diagnosis["fit"])
     console.print()
-    console.print(f"[bold {colour}]{title}.[/] {sentence}")
-    console.print(escape(diagnosis["summary"]))
+    console.print(f"[bold {colour}]{title}.[/] {escape(diagnosis['summary'])}")
     console.print()
     if diagnosis["findings"]:
         console.print(_findings(diagnosis["findings"], joints))

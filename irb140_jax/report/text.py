@@ -4,11 +4,11 @@ import math
 from collections.abc import Sequence
 
 VERDICTS = {
-    "no_mismatch": ("No mismatch", "The model as given explains these recordings down to the noise."),
-    "parameters_only": ("Wrong parameters only", "With refitted masses, centres and inertias nothing is left out."),
-    "physics_left_out": ("Physics left out", "The robot does something that the model does not hold."),
-    "undecided": ("Undecided", "These recordings can't tell whether the model leaves anything out."),
-    "unexplained": ("Unexplained", "Structure is left in the torque which no effect of the library explains."),
+    "no_mismatch": "No mismatch",
+    "parameters_only": "Wrong parameters only",
+    "physics_left_out": "Physics left out",
+    "undecided": "Undecided",
+    "unexplained": "Unexplained",
 }
 
 # Half-width of a 90 % interval of a normal distribution, in standard deviations.

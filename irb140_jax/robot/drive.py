@@ -26,7 +26,7 @@ def drives(model: mujoco.MjModel) -> Drives:
     """Read the actuators; rotor inertia and damping count with the square of the gear, as in MuJoCo's own dynamics.
 
     Args:
-        model: Compiled model with at most one actuator for each joint.
+        model: Compiled model; of two actuators at one joint, which no robot may have, the last one counts.
     """
     n = model.njnt
     gear, armature, damping = np.ones(n), np.zeros(n), np.zeros(n)
@@ -36,12 +36,20 @@ def drives(model: mujoco.MjModel) -> Drives:
     rotor = getattr(model, "actuator_armature", np.zeros(count))
     damper = np.reshape(getattr(model, "actuator_damping", np.zeros(count)), count)
     for a in range(count):
-        j = int(model.actuator_trnid[a, 0])
+        j = driven_joint(model, a)
+        if j is None:
+            continue
         gear[j] = model.actuator_gear[a, 0]
         armature[j] = gear[j] ** 2 * rotor[a]
         damping[j] = gear[j] ** 2 * damper[a]
         effort[j] = min(effort[j], abs(gear[j]) * _force_limit(model, a))
     return Drives(gear, effort, armature, damping)
+
+
+def driven_joint(model: mujoco.MjModel, actuator: int) -> int | None:
+    """The joint that an actuator drives directly, or None."""
+    on_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    return int(model.actuator_trnid[actuator, 0]) if int(model.actuator_trntype[actuator]) in on_joint else None
 
 
 def _force_limit(model: mujoco.MjModel, a: int) -> float:

@@ -1,4 +1,4 @@
-"""What a `Robot` can't represent is refused, by name and with what to do about it."""
+"""What a `Robot` can't represent is refused where it touches the joints chosen: by name, with what to do about it."""
 
 from collections.abc import Iterator, Mapping
 
@@ -6,24 +6,25 @@ import mujoco
 import numpy as np
 
 from irb140_jax.errors import RobotError
-
-MOST_JOINTS = 10
+from irb140_jax.robot.choose import Choice
+from irb140_jax.robot.drive import driven_joint
 
 MAY_BE_INFINITE = ("lower", "upper", "velocity_limit", "effort_limit")
 
 
-def refuse_unsupported(model: mujoco.MjModel, source: str) -> None:
-    """Raise if the compiled model is anything but a serial chain of 1 to 10 named hinges and slides.
+def refuse_unsupported(model: mujoco.MjModel, choice: Choice, source: str) -> None:
+    """Raise if something beside rigid bodies, friction and springs acts on the joints chosen or what they carry.
 
     Args:
         model: Compiled model.
+        choice: Its joints that make the robot.
         source: Where it came from, for the message.
 
     Raises:
         RobotError: Names the first thing that does not fit and what to do about it.
     """
-    for check in (_joints, _chain, _couplings, _forces, _actuators):
-        for problem in check(model):
+    for check in (_forces, _actuators):
+        for problem in check(model, choice):
             raise RobotError(f"{source}: {problem}")
 
 
@@ -48,78 +49,55 @@ def refuse_impossible_numbers(fields: Mapping[str, np.ndarray], names: tuple[str
                 raise RobotError(f"{source}: joint '{name}' has {field} {value:g}; allowed: 0 or more: mend it there")
 
 
-def parent_joint(model: mujoco.MjModel, body: int) -> int:
-    """Index of the last joint on the way from the world to this body, its own included; -1 if there is none."""
-    while body and not model.body_jntnum[body]:
-        body = int(model.body_parentid[body])
-    return int(model.body_jntadr[body] + model.body_jntnum[body] - 1) if body else -1
-
-
-def _joints(model: mujoco.MjModel) -> Iterator[str]:
-    kinds = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
-    for j in range(model.njnt):
-        body = model.body(model.jnt_bodyid[j]).name
-        if int(model.jnt_type[j]) in kinds:
-            kind = kinds[int(model.jnt_type[j])]
-            yield f"body '{body}' has a {kind} joint; known: hinge, slide: weld it to its parent or remove it"
-        if not model.joint(j).name:
-            yield f"a joint of body '{body}' has no name; recordings are matched by joint name: give it one"
-    if not 1 <= model.njnt <= MOST_JOINTS:
-        yield f"the model has {model.njnt} joints, 1 to {MOST_JOINTS} are allowed: give a model of one arm"
-
-
-def _chain(model: mujoco.MjModel) -> Iterator[str]:
-    for j in range(1, model.njnt):
-        body = int(model.jnt_bodyid[j])
-        first_on_body = j == model.body_jntadr[body]
-        parent = parent_joint(model, int(model.body_parentid[body])) if first_on_body else j - 1
-        if parent != j - 1:
-            branch = "the base" if parent < 0 else f"joint '{model.joint(parent).name}'"
-            ways = f"'{model.joint(parent + 1).name}' and '{model.joint(j).name}'"
-            remedy = "remove one branch or weld it (gripper fingers, for example)"
-            yield f"the model branches at {branch}, into {ways}; only a serial chain is known: {remedy}"
-
-
-def _couplings(model: mujoco.MjModel) -> Iterator[str]:
-    active = np.flatnonzero(model.eq_active0)
-    if active.size:
-        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_EQUALITY, int(active[0]))
-        yield f"equality constraint {_shown(name)} closes a loop or couples joints; a serial chain has none: remove it"
-    parts = (("ntendon", "tendons"), ("nflex", "deformable bodies (flex)"), ("nplugin", "plugins"))
-    for field, what in parts:
-        if getattr(model, field, 0):
-            yield f"the model has {what}, which a rigid serial chain can't represent: remove them"
-
-
-def _forces(model: mujoco.MjModel) -> Iterator[str]:
-    if np.any(model.body_gravcomp):
-        body = model.body(int(np.flatnonzero(model.body_gravcomp)[0])).name
-        yield f"body '{body}' has gravcomp, which no joint spring represents: remove it, or model the counterbalance"
+def _forces(model: mujoco.MjModel, choice: Choice) -> Iterator[str]:
+    for body in np.flatnonzero(model.body_gravcomp):
+        if choice.carrier[body] >= 0:
+            name = model.body(body).name
+            yield f"body '{name}' has gravcomp, which no joint spring is: remove it, or model the counterbalance"
     if model.opt.density or model.opt.viscosity or np.any(model.opt.wind):
         yield "<option> has a fluid (density, viscosity or wind), which is not part of this model: set them to 0"
     polynomials = (
-        ("dof_dampingpoly", "polynomial damping", "keep the first coefficient of damping only"),
-        ("jnt_stiffnesspoly", "polynomial stiffness", "keep the first coefficient of stiffness only"),
-        ("jnt_springyield", "a spring that yields (springyield)", "remove it"),
+        ("dof_dampingpoly", model.jnt_dofadr, "polynomial damping", "keep the first coefficient of damping only"),
+        ("jnt_stiffnesspoly", None, "polynomial stiffness", "keep the first coefficient of stiffness only"),
+        ("jnt_springyield", None, "a spring that yields (springyield)", "remove it"),
     )
-    for field, what, remedy in polynomials:
-        for j in _nonzero_rows(model, field):
-            yield f"joint '{model.joint(j).name}' has {what}, which is not part of this model: {remedy}"
+    for field, address, what, remedy in polynomials:
+        rows = _nonzero_rows(model, field)
+        for j in choice.joints:
+            if (j if address is None else int(address[j])) in rows:
+                yield f"joint '{model.joint(j).name}' has {what}, which is not part of this model: {remedy}"
+    for flex in range(getattr(model, "nflex", 0)):
+        ends = model.flex_vertbodyid[model.flex_vertadr[flex] : model.flex_vertadr[flex] + model.flex_vertnum[flex]]
+        if any(choice.carrier[int(body)] >= 0 for body in ends):
+            yield "the arm carries a deformable body (flex), which rigid links can't represent: remove it"
+    for body in np.flatnonzero(np.asarray(getattr(model, "body_plugin", np.full(model.nbody, -1))) >= 0):
+        if choice.carrier[body] >= 0:
+            yield f"body '{model.body(body).name}' has a plugin, which rigid links can't represent: remove it"
 
 
-def _actuators(model: mujoco.MjModel) -> Iterator[str]:
-    on_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+def _actuators(model: mujoco.MjModel, choice: Choice) -> Iterator[str]:
     driver: dict[int, str] = {}
     for a in range(model.actuator_trntype.shape[0]):
         name = _shown(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, a))
-        if int(model.actuator_trntype[a]) not in on_joint:
-            yield f"actuator {name} drives no joint (tendon, site, body or slider-crank): drive a joint or remove it"
+        joint = driven_joint(model, a)
+        if joint is None:
+            if _pushes(model, a, choice):
+                yield f"actuator {name} drives no joint but the arm: drive a joint or remove it"
             continue
-        joint = int(model.actuator_trnid[a, 0])
+        if joint not in choice.joints:
+            continue
         if joint in driver:
             yield f"joint '{model.joint(joint).name}' has two actuators, {driver[joint]} and {name}: keep one of them"
         driver[joint] = name
         yield from _actuator(model, a, name)
+
+
+def _pushes(model: mujoco.MjModel, a: int, choice: Choice) -> bool:
+    """Whether it acts at a site that the chosen joints move; suction at a body does nothing in free air."""
+    kind = int(model.actuator_trntype[a])
+    if kind not in (int(mujoco.mjtTrn.mjTRN_SITE), int(mujoco.mjtTrn.mjTRN_SLIDERCRANK)):
+        return False
+    return choice.carrier[int(model.site_bodyid[model.actuator_trnid[a, 0]])] >= 0
 
 
 def _actuator(model: mujoco.MjModel, a: int, name: str) -> Iterator[str]:
@@ -141,5 +119,3 @@ def _nonzero_rows(model: mujoco.MjModel, field: str) -> list[int]:
 
 def _shown(name: str | None) -> str:
     return f"'{name}'" if name else "(unnamed)"
-
-

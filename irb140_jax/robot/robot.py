@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from irb140_jax.errors import RobotError
+from irb140_jax.robot.tree import Parents, is_depth_first, serial
 from irb140_jax.types import Inertials, Joints, Mat3, Vec3
 
 _PER_JOINT = (
@@ -28,16 +29,17 @@ _SHAPES: dict[str, tuple[int | str, ...]] = {
 
 
 class Robot(eqx.Module):
-    """A serial chain of n hinges and slides.
+    """A chain or tree of n hinges and slides on a fixed base.
 
-    Link i moves with joint i.  Its frame sits on the axis of joint i, and at q = reference it is placed in the frame
-    of link i-1 (the base for i = 0) by `rotation[i]`, `position[i]`.
+    Link i moves with joint i and sits on link `parent[i]`, in a chain the one before; below, "the link before" is that
+    one, or the base where it is -1.  Its frame sits on the axis of joint i, and at q = reference it is placed in the
+    frame of the link before by `rotation[i]`, `position[i]`.  The last link carries the tool.
 
     Attributes:
-        rotation: Orientation of frame i in frame i-1 at q = reference, shape (n, 3, 3).
-        position: Origin of frame i in frame i-1 at q = reference [m], shape (n, 3).
+        rotation: Orientation of frame i in that of the link before at q = reference, shape (n, 3, 3).
+        position: Origin of frame i in that of the link before at q = reference [m], shape (n, 3).
         axis: Unit vector of joint i in frame i, shape (n, 3).
-        reference: Joint coordinate at which the chain is in the pose that `rotation`, `position` give [rad or m].
+        reference: Joint coordinate at which the arm is in the pose that `rotation`, `position` give [rad or m].
         mass: Link masses [kg], shape (n,).
         com: Centres of mass in the link frame [m], shape (n, 3).
         inertia: Inertia tensors about the centre of mass, link axes [kg m^2], shape (n, 3, 3).
@@ -55,10 +57,12 @@ class Robot(eqx.Module):
         lower, upper: Joint limits [rad or m]; +-inf where the model gives none.
         velocity_limit: Largest joint speed [rad/s or m/s]; inf where the model gives none.
         effort_limit: Largest joint torque [N m or N]; inf where the model gives none.
-        joint_names: Names, in the order of the chain.
+        joint_names: Names, from the base outward, one branch after the other.
         is_slide: True for prismatic joints.
         name: The model's name.
         notes: Plain sentences about what the reader had to supply.
+        parent: Link that each link sits on, -1 for the base; those of a chain if not given.  Depth first: a link comes
+            after its parent, and after it all that it carries before anything else.
     """
 
     rotation: Float[Array, "n 3 3"]
@@ -87,6 +91,10 @@ class Robot(eqx.Module):
     is_slide: tuple[bool, ...] = eqx.field(static=True)
     name: str = eqx.field(static=True, default="robot")
     notes: tuple[str, ...] = eqx.field(static=True, default=())
+    parent: Parents = eqx.field(static=True, default=())
+
+    def __post_init__(self):
+        self.parent = tuple(self.parent) or serial(len(self.joint_names))
 
     def __check_init__(self):
         n = self.n
@@ -94,6 +102,11 @@ class Robot(eqx.Module):
             raise RobotError(
                 f"robot '{self.name}': joint_names {self.joint_names}, is_slide {self.is_slide}; give one of each for "
                 "every joint, at least one joint, no name twice"
+            )
+        if len(self.parent) != n or not is_depth_first(self.parent):
+            raise RobotError(
+                f"robot '{self.name}': parent {self.parent}; give for every link the one it sits on, -1 for the base, "
+                "links in depth-first order"
             )
         for field, shape in _SHAPES.items():
             expected = tuple(n if size == "n" else size for size in shape)
@@ -105,6 +118,11 @@ class Robot(eqx.Module):
     def n(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
+
+    @property
+    def is_chain(self) -> bool:
+        """Whether nothing branches: each link sits on the one before."""
+        return self.parent == serial(self.n)
 
     @property
     def phi(self) -> Inertials:

@@ -5,18 +5,20 @@ resolved, so they are left out.  What a URDF means by leaving something out is k
 """
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from irb140_jax.errors import RobotError
-
-# MuJoCo compiles no moving body without mass or inertia; it gets this instead [kg, kg m^2], below any torque seen.
-NEGLIGIBLE = 1e-12
+from irb140_jax.robot.inertia import NEGLIGIBLE, Inertial, is_lopsided, is_negative
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
-KNOWN_TYPES = ("revolute", "continuous", "prismatic", "fixed")
+KNOWN_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+# How a base floats; MuJoCo gets it fixed, and nothing may be diagnosed on it unless it was held.
+FLOATING = ("floating", "planar")
 
 
 class PreparedURDF(NamedTuple):
@@ -26,13 +28,19 @@ class PreparedURDF(NamedTuple):
         text: The XML.
         effort: Largest torque by joint name [N m or N], where the file gives one above zero.
         velocity: Largest speed by joint name [rad/s or m/s], where the file gives one above zero.
-        notes: Plain sentences about what was supplied.
+        link_notes: Plain sentences about what was supplied, by the link they are about.
+        broken: Inertials that no body has, by link; MuJoCo gets none for them.
+        floating: Links that a floating or planar joint carries.
+        mimics: Joints that follow others: follower, leader, factor, offset.
     """
 
     text: str
     effort: dict[str, float]
     velocity: dict[str, float]
-    notes: tuple[str, ...]
+    link_notes: dict[str, str]
+    broken: dict[str, Inertial]
+    floating: frozenset[str]
+    mimics: tuple[tuple[str, str, float, float], ...]
 
 
 def prepared_urdf(robot: ET.Element, source: str) -> PreparedURDF:
@@ -43,7 +51,7 @@ def prepared_urdf(robot: ET.Element, source: str) -> PreparedURDF:
         source: The file's name, for messages.
 
     Raises:
-        RobotError: A xacro file, a joint type or coupling that a serial chain does not have, or broken references.
+        RobotError: A xacro file, a unknown joint type, or broken references.
     """
     _refuse(robot, source)
     bare = ET.Element("robot", {"name": robot.get("name", "robot")})
@@ -57,10 +65,15 @@ def prepared_urdf(robot: ET.Element, source: str) -> PreparedURDF:
         links.add("world")
     for joint in robot.findall("joint"):
         bare.append(_bare_joint(joint, links, source))
+    broken = {link.get("name", ""): raw for link in bare.findall("link") if (raw := _broken(link, source))}
     for link in bare.findall("link"):
-        _refuse_impossible_mass(link, source)
+        if link.get("name") in broken:
+            link.remove(link.findall("inertial")[0])
     effort, velocity = (_limits(robot, key, source) for key in ("effort", "velocity"))
-    return PreparedURDF(ET.tostring(bare, encoding="unicode"), effort, velocity, _notes(robot))
+    text = ET.tostring(bare, encoding="unicode")
+    return PreparedURDF(
+        text, effort, velocity, _notes(robot), broken, _floating(robot), tuple(_mimics(robot, source))
+    )
 
 
 def _refuse(robot: ET.Element, source: str) -> None:
@@ -73,8 +86,6 @@ def _refuse(robot: ET.Element, source: str) -> None:
         if kind not in KNOWN_TYPES:
             known = ", ".join(KNOWN_TYPES)
             raise RobotError(f"{source}: joint '{name}' is of type '{kind}'; known: {known}: fix it or remove it")
-        if joint.find("mimic") is not None:
-            raise RobotError(f"{source}: joint '{name}' mimics another one; known: independent joints: make it fixed")
     for tag in ("link", "joint"):
         names = [element.get("name", "") for element in robot.findall(tag)]
         twice = next((name for name in names if names.count(name) > 1), None)
@@ -100,6 +111,7 @@ def _bare_joint(joint: ET.Element, links: set[str], source: str) -> ET.Element:
         link = "" if element is None else element.get("link", "")
         if link not in links:
             raise RobotError(f"{source}: joint '{name}' has {end} '{link}', but no such link exists: add or rename it")
+    kind = "fixed" if kind in FLOATING else kind
     kept = ET.Element("joint", {"name": name, "type": kind})
     moving = () if kind == "fixed" else ("axis", "limit", "dynamics")
     kept.extend(element for tag in ("origin", "parent", "child", *moving) for element in joint.findall(tag))
@@ -108,15 +120,50 @@ def _bare_joint(joint: ET.Element, links: set[str], source: str) -> ET.Element:
     return kept
 
 
-def _refuse_impossible_mass(link: ET.Element, source: str) -> None:
-    """Negative values have to be caught here, before `NEGLIGIBLE` takes their place."""
+def _broken(link: ET.Element, source: str) -> Inertial | None:
+    """The link's inertial where no body has it, which MuJoCo would refuse; else None."""
     mass = _numbers(link.find("inertial/mass"), ("value",), link, source)[0]
     xx, xy, xz, yy, yz, zz = _numbers(link.find("inertial/inertia"), _INERTIA, link, source)
-    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    # Files are printed to a few digits, which may turn a moment of zero slightly negative.
-    if mass < 0.0 or moments[0] < -1e-6 * max(moments[2], NEGLIGIBLE):
-        what = f"mass {mass:g} kg and principal moments of inertia {moments} kg m^2"
-        raise RobotError(f"{source}: link '{link.get('name')}' has {what}; none may be negative: mend its <inertial>")
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if not is_negative(mass, inertia) and not is_lopsided(inertia):
+        return None
+    origin = link.find("inertial/origin")
+    placed = {} if origin is None else origin.attrib
+    com, rpy = (_triple(placed.get(key, "0 0 0"), link, source) for key in ("xyz", "rpy"))
+    R = Rotation.from_euler("xyz", rpy).as_matrix()
+    return Inertial(mass, com, R @ inertia @ R.T)
+
+
+def _triple(text: str, link: ET.Element, source: str) -> np.ndarray:
+    try:
+        x, y, z = (float(word) for word in text.split())
+        return np.array([x, y, z])
+    except ValueError as error:
+        name = link.get("name")
+        raise RobotError(f"{source}: link '{name}': '{text}' in its <inertial>: give three numbers") from error
+
+
+def _floating(robot: ET.Element) -> frozenset[str]:
+    return frozenset(
+        child.get("link", "") for joint in robot.findall("joint") if joint.get("type") in FLOATING
+        for child in joint.findall("child")
+    )  # fmt: skip
+
+
+def _mimics(robot: ET.Element, source: str) -> Iterator[tuple[str, str, float, float]]:
+    still = ("fixed", *FLOATING)
+    moving = {joint.get("name", "") for joint in robot.findall("joint") if joint.get("type") not in still}
+    for joint in robot.findall("joint"):
+        mimic, name = joint.find("mimic"), joint.get("name", "")
+        if mimic is None or name not in moving:
+            continue
+        leader = mimic.get("joint", "")
+        if leader not in moving:
+            raise RobotError(f"{source}: joint '{name}' mimics '{leader}', but no such joint moves: mend its <mimic>")
+        try:
+            yield name, leader, float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))
+        except ValueError as error:
+            raise RobotError(f"{source}: joint '{name}': {error}: give numbers in its <mimic>") from error
 
 
 def _numbers(element: ET.Element | None, keys: tuple[str, ...], link: ET.Element, source: str) -> list[float]:
@@ -147,19 +194,19 @@ def _limits(robot: ET.Element, key: str, source: str) -> dict[str, float]:
     return limits
 
 
-def _notes(robot: ET.Element) -> tuple[str, ...]:
+def _notes(robot: ET.Element) -> dict[str, str]:
     moved = {
-        child.get("link") for joint in robot.findall("joint") if joint.get("type") != "fixed"
+        child.get("link") for joint in robot.findall("joint") if joint.get("type") not in ("fixed", *FLOATING)
         for child in joint.findall("child")
     }  # fmt: skip
-    notes = []
+    notes = {}
     for link in robot.findall("link"):
         name, inertia, mass = link.get("name"), link.find("inertial/inertia"), link.find("inertial/mass")
         if name in moved and (mass is None or not _any(mass, ("value",))):
-            notes.append(f"link '{name}' has no mass of its own in the file")
+            notes[str(name)] = f"link '{name}' has no mass of its own in the file"
         elif name in moved and (inertia is None or not _any(inertia, ("ixx", "iyy", "izz"))):
-            notes.append(f"link '{name}' has no rotational inertia in the file and counts as a point mass")
-    return tuple(notes)
+            notes[str(name)] = f"link '{name}' has no rotational inertia in the file and counts as a point mass"
+    return notes
 
 
 def _any(element: ET.Element, keys: tuple[str, ...]) -> bool:

@@ -3,10 +3,11 @@
 import numpy as np
 
 from irb140_jax.robot.robot import Robot
+from irb140_jax.robot.tree import children
 
 
 def robot_mjcf(robot: Robot, option: str = "", flag: str = "") -> str:
-    """MJCF of the chain: inertials, rotors, friction, springs, limits, motors with their gears, and the tool.
+    """MJCF of the chain or tree: inertials, rotors, friction, springs, limits, motors with their gears, and the tool.
 
     Shapes to draw or to touch are no part of a `Robot`, so there are none.
 
@@ -18,13 +19,7 @@ def robot_mjcf(robot: Robot, option: str = "", flag: str = "") -> str:
     Returns:
         The XML.  Loaded again, every number is the same to rounding.
     """
-    inner = f'<site name="tool" {_placed(robot.tool_rotation, robot.tool_position)}/>'
-    for i in reversed(range(robot.n)):
-        inner = (
-            f'\n<body name="link{i + 1}" {_placed(robot.rotation[i], robot.position[i])}>\n'
-            f"{_inertial(robot, i)}\n{_joint(robot, i)}{inner}</body>"
-        )
-    base = f'<body name="base" {_placed(robot.base_rotation, robot.base_position)}>{inner}\n</body>'
+    base = f'<body name="base" {_placed(robot.base_rotation, robot.base_position)}>{_carried_by(robot, -1)}\n</body>'
     gravity = _text(np.asarray(robot.base_rotation) @ np.asarray(robot.gravity))
     motors = "\n".join(_motor(robot, i) for i in range(robot.n))
     return (
@@ -33,6 +28,17 @@ def robot_mjcf(robot: Robot, option: str = "", flag: str = "") -> str:
         f'<option gravity="{gravity}" {option}><flag {flag}/></option>\n{_speeds(robot)}'
         f"<worldbody>\n{base}\n</worldbody>\n<actuator>\n{motors}\n</actuator>\n</mujoco>\n"
     )
+
+
+def _carried_by(robot: Robot, link: int) -> str:
+    """The bodies that sit on a link, -1 for the base, with all beyond them; on the last link the tool."""
+    bodies = "".join(
+        f'\n<body name="link{i + 1}" {_placed(robot.rotation[i], robot.position[i])}>\n'
+        f"{_inertial(robot, i)}\n{_joint(robot, i)}{_carried_by(robot, i)}</body>"
+        for i in children(robot.parent, link)
+    )
+    tool = f'<site name="tool" {_placed(robot.tool_rotation, robot.tool_position)}/>'
+    return bodies + tool if link == robot.n - 1 else bodies
 
 
 def _joint(robot: Robot, i: int) -> str:

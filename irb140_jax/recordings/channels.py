@@ -1,0 +1,300 @@
+"""What is wrong with whole channels: dead or frozen torque, exchanged or reversed columns, another unit or side.
+
+Hypotheses of a line each, tried where the model as given explains a recording badly.  One is believed only if it turns
+nearly nothing explained into nearly all: the model is allowed to be wrong, that is what the program is for.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import nnls
+
+from irb140_jax.recordings.glance import Glance
+from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.repair import longest_run
+from irb140_jax.recordings.torques import Torques, nominal_torques
+from irb140_jax.robot import Robot
+
+FROZEN = 0.5  # s that a torque must hold one value while its joint moves
+FROZEN_RUNS = 10.0  # times as long as it holds any other value: a coarse sensor repeats itself more evenly
+MOVED = 0.05  # of the joint's travel that it must move meanwhile
+WELL, BADLY = 0.9, 0.6  # shares of a torque's variance that the model explains under a true hypothesis, and as given
+BETTER = 5.0  # times less that is left unexplained under a true hypothesis
+SURE = 0.97  # share that suffices on two joints at least, however well the model as given explains
+CHANGED = 0.05  # of the share by which a joint is concerned by a hypothesis
+ZERO_STEP = 0.4  # rad between zeros tried; the nearest is 0.2 rad off, which leaves 2 % of gravity
+LATEST = 0.4  # s by which a torque may come late
+ALIKE = 1.5  # largest over smallest of factors that are one
+ORDER = "put the columns in order, or exchange them with --columns FILE.toml"
+FAR_OFF = 5.0  # times too large or small, alike on most joints, that no wrong mass explains; 4 times that if not alike
+
+
+class Doubt(NamedTuple):
+    """Something wrong with whole channels.
+
+    Attributes:
+        kind: What: "reversed torque", "reversed position", "reversed axis", "exchanged torque", "exchanged positions",
+            "gravity", "zero", "late", "unit".
+        joints: Indices of the joints concerned.
+        said: A sentence that names the columns.
+        remedy: What would mend it.
+        scale: Factors, by column, that would; empty where none do.
+    """
+
+    kind: str
+    joints: tuple[int, ...]
+    said: str
+    remedy: str
+    scale: dict[str, float]
+
+
+# --- dead and frozen torque ------------------------------------------------------------------------------------------
+
+
+def with_lost_torque_marked(recording: Recording, least_travel: np.ndarray) -> Recording:
+    """The recording with the rows marked in which a torque channel is dead or frozen while its joint moves.
+
+    Args:
+        recording: With torque.
+        least_travel: Below it, a joint counts as standing still [rad or m], shape (n,).
+
+    Returns:
+        The same with `torque_lost`, and a note for every channel concerned.
+    """
+    lost, notes = np.zeros(recording.tau.shape, dtype=bool), list(recording.notes)
+    for j, name in enumerate(recording.joint_names):
+        rows = _frozen(recording.t, recording.q[:, j], recording.tau[:, j], least_travel[j])
+        if not rows.any():
+            continue
+        lost[rows, j] = True
+        value, i = recording.tau[rows, j][0], np.flatnonzero(rows)
+        if rows.all():
+            notes.append(f"tau.{name} is {value:.4g} in every row though the joint moves: a dead channel. {name} is "
+                         "not judged; the others are. Log its torque or current, or map the column that holds it")
+        else:
+            when = f"from {recording.t[i[0]]:.4g} s to {recording.t[i[-1]]:.4g} s"
+            notes.append(f"tau.{name} is frozen at {value:.4g} {when} though the joint moves: these rows of {name} are "
+                         "left out")
+    if not lost.any():
+        return recording
+    return dataclasses.replace(recording, torque_lost=lost, notes=tuple(dict.fromkeys(notes)))
+
+
+def _frozen(t: np.ndarray, q: np.ndarray, tau: np.ndarray, least: float) -> np.ndarray:
+    """Rows of the longest run of one value, if it is far longer than any other and the joint moves in it."""
+    if np.ptp(q) < least:
+        return np.zeros(len(t), dtype=bool)
+    if np.ptp(tau) == 0.0:
+        return np.ones(len(t), dtype=bool)
+    same = np.concatenate([[False], tau[1:] == tau[:-1]])
+    length, start = longest_run(same)
+    rows = np.zeros(len(t), dtype=bool)
+    rows[max(start - 1, 0) : start + length] = True
+    next_longest = longest_run(same & ~rows)[0]
+    moved = np.ptp(q[rows]) if rows.any() else 0.0
+    sure = length > FROZEN_RUNS * (next_longest + 1) and t[rows][-1] - t[rows][0] > FROZEN and moved > MOVED * np.ptp(q)
+    return rows if sure else np.zeros(len(t), dtype=bool)
+
+
+# --- hypotheses ------------------------------------------------------------------------------------------------------
+
+
+def channel_doubts(
+    recording: Recording, seen: Glance, robot: Robot, judged: np.ndarray, driven: np.ndarray
+) -> list[Doubt]:
+    """The likeliest thing that is wrong with whole channels, if the model as given explains badly and that well.
+
+    Args:
+        recording: For its names.
+        seen: A quick look at it.
+        robot: The nominal model.
+        judged: Joints that move and have a living torque channel, shape (n,).
+        driven: Those whose torque is not small beside the model's; of others only the size may be judged, shape (n,).
+
+    Returns:
+        Nothing, or one doubt: the simplest of those that explain.
+    """
+    model = nominal_torques(robot, seen.q, seen.qd, seen.qdd)
+    given = explained(seen, model, judged)
+    if not judged.any() or np.nanmin(np.where(judged, given, 1.0)) > SURE:
+        return unit_doubts(recording, seen, model, judged)
+    # What each hypothesis changes must be explained after it and not before, and nothing else may suffer.
+    best: tuple[float, Doubt] | None = None
+    for cost, doubt, after in _hypotheses(recording, seen, robot, model, judged):
+        changed = judged & (np.abs(after - given) > CHANGED)
+        if not changed.any() or np.any(changed & ~driven) or np.any(after[changed] < WELL):
+            continue
+        if np.mean(1.0 - given[changed]) < BETTER * np.mean(1.0 - after[changed]):
+            continue
+        sure = changed.sum() > 1 and np.min(after[changed]) > SURE
+        if np.mean(given[changed]) > BADLY and not sure:
+            continue
+        gain = float(np.sum(np.log((1.0 - given[judged] + 0.01) / (1.0 - after[judged] + 0.01)))) - cost
+        if gain > 0.0 and (best is None or gain > best[0] + 0.5):
+            best = gain, doubt
+    return [best[1]] if best else unit_doubts(recording, seen, model, judged)
+
+
+def explained(seen: Glance, model: Torques, judged: np.ndarray, tau: np.ndarray | None = None) -> np.ndarray:
+    """Share of each torque's variance that the model's torque, of any size, and the joint's friction explain, (n,)."""
+    tau = seen.tau if tau is None else tau
+    out = np.full(tau.shape[1], np.nan)
+    for j in np.flatnonzero(judged):
+        out[j] = _share(_features(seen.qd[:, j], model.total[:, j]), tau[:, j])
+    return out
+
+
+def _features(qd: np.ndarray, model: np.ndarray) -> np.ndarray:
+    slow = 0.02 * np.abs(qd).max() + 1e-12
+    return np.stack([model, qd, np.tanh(qd / slow)], axis=1)
+
+
+def _share(features: np.ndarray, target: np.ndarray) -> float:
+    """Share of the target's variance that a combination without negative amplitudes explains."""
+    features, target = features - features.mean(axis=0), target - target.mean()
+    power = target @ target
+    if power <= 0.0:
+        return 0.0
+    Q, R = np.linalg.qr(features / np.maximum(np.linalg.norm(features, axis=0), 1e-300))
+    inside = Q.T @ target
+    return float((inside @ inside - nnls(R, inside)[1] ** 2) / power)
+
+
+def _hypotheses(
+    recording: Recording, seen: Glance, robot: Robot, model: Torques, judged: np.ndarray
+) -> Iterator[tuple[float, Doubt, np.ndarray]]:
+    """Every hypothesis with what it costs in plausibility and what is explained under it."""
+    names, n = recording.joint_names, robot.n
+    again = lambda q, qd, qdd: nominal_torques(robot, q, qd, qdd)  # noqa: E731
+    for j in map(int, np.flatnonzero(judged)):
+        sign = np.where(np.arange(n) == j, -1.0, 1.0)
+        turned = seen._replace(q=sign * seen.q, qd=sign * seen.qd, qdd=sign * seen.qdd)
+        other = again(turned.q, turned.qd, turned.qdd)
+        tau, q = f"tau.{names[j]}", f"q.{names[j]}"
+        yield 0.5, Doubt(
+            "reversed torque", (j,), f"column {tau} of the wrong sign: the reversed torque is what the model and "
+            "friction would need", f"map it with --columns and [scale] \"{tau}\" = -1", {tau: -1.0},
+        ), explained(seen, model, judged, sign * seen.tau)  # fmt: skip
+        yield 1.0, Doubt(
+            "reversed position", (j,), f"column {q} of the wrong sign: with it reversed the model explains the torque",
+            f"map it with --columns and [scale] \"{q}\" = -1", {q: -1.0},
+        ), explained(turned, other, judged)  # fmt: skip
+        yield 1.0, Doubt(
+            "reversed axis", (j,), f"columns {q} and {tau} both count the other way round than the model's axis",
+            f"map them with --columns and [scale] \"{q}\" = -1 and \"{tau}\" = -1, or turn the axis in the model",
+            {q: -1.0, tau: -1.0},
+        ), explained(turned, other, judged, sign * seen.tau)  # fmt: skip
+    for a, b in itertools.combinations(range(n), 2):
+        order = np.arange(n)
+        order[[a, b]] = b, a
+        pair = f"{names[a]} and {names[b]}"
+        yield 1.0, Doubt(
+            "exchanged torque", (a, b), f"torque columns look exchanged: tau.{names[b]} fits joint {names[a]}, "
+            f"tau.{names[a]} fits joint {names[b]}", ORDER, {},
+        ), explained(seen, model, judged & judged[order], seen.tau[:, order])  # fmt: skip
+        if robot.is_slide[a] == robot.is_slide[b]:
+            turned = seen._replace(q=seen.q[:, order], qd=seen.qd[:, order], qdd=seen.qdd[:, order])
+            yield 1.5, Doubt(
+                "exchanged positions", (a, b), f"position columns of {pair} look exchanged: the other way round the "
+                "model explains the torque", ORDER, {},
+            ), explained(turned, again(turned.q, turned.qd, turned.qdd), judged)  # fmt: skip
+    # Of a joint alone, gravity turned round is a mass on the other side, and its zero is where that mass hangs.
+    if judged.sum() > 1:
+        yield 0.5, Doubt(
+            "gravity", tuple(np.flatnonzero(judged).tolist()), "gravity in the model looks reversed: turned round, the "
+            "model explains the torque", "turn `gravity` round in the model, or mend how its base is mounted", {},
+        ), explained(seen, Torques(-model.gravity, model.moving), judged)  # fmt: skip
+        # The first joint's zero is how the base is mounted.
+        for j in np.flatnonzero(judged & ~np.asarray(robot.is_slide))[1:]:
+            yield from _zeros(recording, seen, robot, judged, int(j))
+
+
+def _zeros(
+    recording: Recording, seen: Glance, robot: Robot, judged: np.ndarray, j: int
+) -> Iterator[tuple[float, Doubt, np.ndarray]]:
+    """The best zero of a joint that is not near the one given."""
+    step = np.eye(robot.n)[j]
+
+    def at(offset: float) -> np.ndarray:
+        return explained(seen, nominal_torques(robot, seen.q + offset * step, seen.qd, seen.qdd), judged)
+
+    tried = {z: at(z) for z in np.arange(-np.pi, np.pi, ZERO_STEP) if abs(z) > ZERO_STEP}
+    near = max(tried, key=lambda z: float(np.nansum(tried[z])))
+    fine = {z: at(z) for z in near + np.linspace(-0.5, 0.5, 9) * ZERO_STEP}
+    best = max(fine, key=lambda z: float(np.nansum(fine[z])))
+    name = recording.joint_names[j]
+    yield 1.5, Doubt(
+        "zero", (j,), f"the zero of q.{name} looks {best:+.2g} rad off: moved so far, the model explains the torque",
+        f"map it with --columns and [offset] \"q.{name}\" = {best:.3g}, or mend the joint's reference in the model", {},
+    ), fine[best]  # fmt: skip
+
+
+def lateness(recording: Recording, seen: Glance, model: Torques, j: int) -> float:
+    """Time by which a joint's torque must be moved ahead for the model to explain it [s], 0 where that doesn't help.
+
+    Args:
+        recording: The recording.
+        seen: A quick look at it.
+        model: Torque of the nominal model.
+        j: The joint.
+    """
+    step = (recording.t[-1] - recording.t[0]) / len(seen.tau)
+    features = _features(seen.qd[:, j], model.total[:, j])
+    turned = _share(features, -seen.tau[:, j])
+    # A slow wave turned round is nearly the wave half a period late.
+    best = 1.0 - min(1.0 - WELL, (1.0 - turned) / 2.0), 0
+    for k in range(1, int(LATEST / step) + 1):
+        share = _share(features[:-k], seen.tau[k:, j])
+        best = max(best, (share, k))
+    return best[1] * step
+
+
+# --- units -----------------------------------------------------------------------------------------------------------
+
+
+def unit_doubts(recording: Recording, seen: Glance, model: Torques, judged: np.ndarray) -> list[Doubt]:
+    """Torque of the model's shape that is far too large or too small on most joints: another unit or side.
+
+    Of one joint alone nothing is said below a factor of twenty: it may carry many times what the model gives it.
+    """
+    ratio = {int(j): r for j in np.flatnonzero(judged) if (r := _ratio(seen, model, int(j))) > 0.0}
+    if not ratio or 2 * len(ratio) <= judged.sum():
+        return []
+    sizes, names = np.array(list(ratio.values())), [recording.joint_names[j] for j in ratio]
+    middle, alike = float(np.exp(np.mean(np.log(sizes)))), float(sizes.max() / sizes.min()) < ALIKE
+    far = FAR_OFF if alike and len(ratio) > 1 else 4.0 * FAR_OFF
+    if not (middle > far and sizes.min() > FAR_OFF or middle < 1.0 / far and sizes.max() < 1.0 / FAR_OFF):
+        return []
+    worst = int(np.argmax(np.abs(np.log(sizes))))
+    factors = {f"tau.{name}": float(f"{1.0 / s:.3g}") for name, s in zip(names, sizes, strict=True)}
+    listed = ", ".join(f"\"{k}\" = {v:g}" for k, v in factors.items())
+    guess = "percent of the rated torque or mA" if middle > 1.0 else "motor side, ampere or a share of the rated"
+    if alike and 800.0 < middle < 1250.0:
+        guess = "mN m"
+    said = (
+        f"column tau.{names[worst]} has the shape of the model's torque but is {sizes[worst]:.3g} times as large, and "
+        f"so with the other joints: this looks like {guess}; N m on the joint side are wanted"
+    )
+    remedy = (
+        "multiply motor torque by the gear ratio, current by the torque constant too, percent by a hundredth of the "
+        f"rated torque, with --columns and [scale]; near the model's torque would be {listed}"
+    )
+    return [Doubt("unit", tuple(ratio), said, remedy, factors)]
+
+
+def _ratio(seen: Glance, model: Torques, j: int) -> float:
+    """How many times the model's torque the logged one is, without friction; 0 where they have little in common."""
+    features = _features(seen.qd[:, j], model.total[:, j])
+    centred, target = features - features.mean(axis=0), seen.tau[:, j] - seen.tau[:, j].mean()
+    size = np.linalg.norm(centred, axis=0)
+    if size[0] <= 0.0 or not target.any():
+        return 0.0
+    Q, R = np.linalg.qr(centred / np.maximum(size, 1e-300))
+    w, missed = nnls(R, Q.T @ target)
+    power = target @ target
+    whole = (Q.T @ target) @ (Q.T @ target) - missed**2
+    clear = whole > WELL * power and (w[0] ** 2) > 0.25 * power
+    return float(w[0] / size[0]) if clear else 0.0

@@ -1,0 +1,1 @@
+"""One module a family of file formats: bytes to named columns.  Nothing here knows what a column means."""

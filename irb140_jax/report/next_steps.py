@@ -1,0 +1,77 @@
+"""What to do after a diagnosis, with commands that can be copied."""
+
+import shlex
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+
+class Step(NamedTuple):
+    """One thing to do.
+
+    Attributes:
+        say: What it is for, one sentence.
+        code: Lines for a terminal, or of Python; may be empty.
+    """
+
+    say: str
+    code: tuple[str, ...] = ()
+
+
+def next_steps(diagnosis: Mapping, folder: str) -> list[Step]:
+    """What this diagnosis leaves to be done, most useful first.
+
+    Args:
+        diagnosis: What diagnosis.json holds.
+        folder: Where it lies.
+    """
+    here = shlex.quote(folder)
+    steps = list(_recording(diagnosis, folder))
+    if diagnosis["findings"] or diagnosis["verdict"] == "parameters_only":
+        steps.append(Step(
+            "Check the corrected model on a motion that it has not seen: its torque beside the other two, row by row.",
+            (f"irb140 predict {here} another.csv --out torque.csv",),
+        ))  # fmt: skip
+        steps.append(Step(
+            f"Use it: {folder}/corrected.xml holds what MuJoCo can express (corrected.md says what it can't); "
+            "all of it is there in JAX.",
+            ("import irb140_jax as irb", f'robot = irb.load_corrected("{folder}")'),
+        ))  # fmt: skip
+    elif diagnosis["verdict"] == "no_mismatch":
+        steps.append(Step(
+            "Nothing to mend. To see whether this holds elsewhere, compare the model with a motion of another kind.",
+            (f"irb140 predict {here} another.csv --out torque.csv",),
+        ))  # fmt: skip
+    if diagnosis["unexplained"]:
+        joints = ", ".join(dict.fromkeys(joint for rest in diagnosis["unexplained"] for joint in rest["joints"]))
+        steps.append(Step(
+            f"Look at {joints} under “Motion and torque” below: torque over position and over speed shows what kind of "
+            "thing it is that has no name."
+        ))  # fmt: skip
+    return steps
+
+
+def _recording(diagnosis: Mapping, folder: str) -> Iterator[Step]:
+    """What to record, where something is open."""
+    undecided = diagnosis["verdict"] == "undecided"
+    rivals = any(finding["alternatives"] for finding in diagnosis["findings"])
+    if not (undecided or rivals or diagnosis["not_testable"]):
+        return
+    why = (
+        "Record more: this motion is designed for what these recordings could not decide."
+        if undecided
+        else "Let the robot play the motion that best separates the rivals" + (
+            " and shows what could not be tested." if diagnosis["not_testable"] else ".")
+        if rivals
+        else "Let the robot play a motion that shows what these recordings could not."
+    )  # fmt: skip
+    yield Step(why, (f"irb140 excite {shlex.quote(folder)} --out motion.csv",))
+    yield Step("Record it, and diagnose old and new recordings together.", (_again(diagnosis, folder),))
+
+
+def _again(diagnosis: Mapping, folder: str) -> str:
+    """The command of this diagnosis with one recording more."""
+    provenance = diagnosis.get("provenance") or {}
+    words = shlex.split(provenance.get("command", "irb140 diagnose REC"))
+    after = 2 + (len(provenance["recordings"]) if provenance else 1)
+    words[after:after] = ["recorded.csv"]
+    return shlex.join([*words, "--out", f"{folder.rstrip('/')}-2"])

@@ -1,0 +1,183 @@
+"""docs/calibration.md and its figures, from stored results only.
+
+    python -m testbed.report
+"""
+
+import collections
+import pathlib
+from collections.abc import Callable
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from testbed import cases, diagram, runner, scoring
+from testbed.probes import PROBES
+from testbed.statistics import calibration_error, covered, wilson
+
+ROOT = pathlib.Path(__file__).parents[1]
+LEVELS = (0.5, 0.9, 0.99)
+WAYS = ("named", "in the class", "not testable", "unexplained", "missed")
+PLACES = ("located", "named alike", "noted", "not said")
+Lines = list[dict[str, Any]]
+Rows = list[tuple[str, ...]]
+
+
+def counted(facts: list[bool]) -> str:
+    """A share with its 95 % interval: "12 of 40: 30 % (18 to 45)"."""
+    if not facts:
+        return "none"
+    low, high = wilson(sum(facts), len(facts))
+    return f"{sum(facts)} of {len(facts)}: {100 * np.mean(facts):.1f} % ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def figures(lines: Lines) -> Rows:
+    """Measure, figure and goal."""
+    of = lambda fact: [x for line in lines for x in fact(line)]  # noqa: E731
+    each = lambda fact: counted([fact(line) for line in lines])  # noqa: E731
+    stated, classes, found = of(scoring.probabilities), of(scoring.stated_classes), of(scoring.intervals)
+    return [
+        *_about_names(lines, stated),
+        *((f"{100 * level:.0f} % intervals that hold the truth",
+           counted([covered(v, s, true, level) for *_, v, s, true in found]),
+           "85 to 95 %" if level == 0.9 else "") for level in LEVELS),
+        *_about_classes([c for c in classes if c["slug"]]),
+        ("torque constants named within 5 %", counted(of(scoring.gains)), ""),
+        ("stated noise over the sensors', median", _median(of(scoring.floors)), ""),
+        ("joints where it is at most 1.3", counted([x <= 1.3 for x in of(scoring.floors)]), "all"),
+        ("things without a name that are located, named alike or noted",
+         counted([how != "not said" for _, how in of(scoring.located)]), ""),
+        ("error on unseen motions over refit's, median where something without a name is hidden",
+         _median([scoring.unseen_ratio(x) for x in lines if scoring.located(x)]), "at most 0.5"),
+        ("verdict that the truth allows", each(scoring.verdict_right), ""),
+        ("cases with a sentence on a mass or inertia below zero", each(scoring.impossible_stated), "none"),
+        ("exported models with a link that no body can be",
+         each(lambda x: bool(x["impossible"].get("corrected"))), "none"),
+    ]  # fmt: skip
+
+
+def _about_names(lines: Lines, stated: list[tuple[str, float, bool]]) -> Rows:
+    named = [x for x in stated if x[0] not in scoring.ORDINARY]
+    error = lambda xs: f"{100 * calibration_error([p for _, p, _ in xs], [hit for *_, hit in xs]):.1f} % of {len(xs)}"  # noqa: E731
+    mean = lambda ordinary: f"{np.mean([len(scoring.false_names(x, ordinary)) for x in lines]):.3g}"  # noqa: E731
+    return [
+        ("false names a case, ordinary friction aside", mean(False), "at most 0.05"),
+        ("cases with one", counted([bool(scoring.false_names(x)) for x in lines]), ""),
+        ("false ordinary friction a case", mean(True), ""),
+        ("expected calibration error, all findings", error(stated), "at most 3 %"),
+        ("the same, ordinary friction aside", error(named), ""),
+        ("wrong above 0.99, all findings", counted([not hit for _, p, hit in stated if p > 0.99]), "at most 1 %"),
+        ("the same, ordinary friction aside", counted([not hit for _, p, hit in named if p > 0.99]), "at most 1 %"),
+    ]
+
+
+def _about_classes(classes: list[dict[str, Any]]) -> Rows:
+    sizes = [c["size"] for c in classes if c["size"]]
+    seen = [c["size"] > 0 for c in classes if c["how"] != "not testable"]
+    return [
+        ("true effect in the stated class", counted([c["size"] > 0 for c in classes]), "at least 95 %"),
+        ("the same, without what was listed as not testable", counted(seen), ""),
+        ("names in that class, mean", f"{np.mean(sizes):.2f}" if sizes else "none", "at most 1.6"),
+    ]
+
+
+def _median(xs: list[float]) -> str:
+    return f"{np.median(xs):.2f} of {len(xs)}" if xs else "none"
+
+
+def coverage(lines: Lines) -> Rows:
+    """Coverage of the intervals by effect."""
+    by: dict[str, list[tuple[float, float, float]]] = collections.defaultdict(list)
+    for line in lines:
+        for effect, _, value, std, true in scoring.intervals(line):
+            by[effect].append((value, std, true))
+    share = lambda xs, level: f"{100 * np.mean([covered(v, s, true, level) for v, s, true in xs]):.0f}"  # noqa: E731
+    return [(e, str(len(xs)), *(share(xs, level) for level in LEVELS)) for e, xs in sorted(by.items())]
+
+
+def tally(lines: Lines, of: Callable[[dict[str, Any]], list[tuple[str, str]]], ways: tuple[str, ...]) -> Rows:
+    """How often each kind came out in which way."""
+    by = collections.defaultdict(collections.Counter)
+    for line in lines:
+        for kind, how in of(line):
+            by[kind][how] += 1
+    return [(kind, str(n.total()), *(str(n[way] or "") for way in ways)) for kind, n in sorted(by.items())]
+
+
+def false_rows(lines: Lines) -> Rows:
+    """Every false name."""
+    return [
+        (str(x["index"]), " + ".join(x["kinds"]), _short(f), f"{f['evidence']['probability']:.5g}")
+        for x in lines for f in scoring.false_names(x)
+    ] or [("none", "", "", "")]  # fmt: skip
+
+
+def probe_row(line: dict[str, Any]) -> tuple[str, ...]:
+    """A probe in a row of a table."""
+    found, said = scoring.intervals(line), line["diagnosis"]
+    holding = sum(covered(v, s, true, 0.9) for *_, v, s, true in found)
+    at = [f"{', '.join(u['joints'])} {100 * u['share']:.0f} %" for u in said["unexplained"]]
+    return (
+        PROBES[line["probe"]][0], "; ".join(map(_short, scoring.false_names(line))) or "none",
+        f"{np.max(scoring.floors(line)):.2f}", f"{holding} of {len(found)}", "; ".join(at) or "none",
+        f"{scoring.unseen_ratio(line):.3g}", said["verdict"] + ("" if scoring.verdict_right(line) else " (wrong)"),
+    )  # fmt: skip
+
+
+def _short(finding: dict[str, Any]) -> str:
+    joints = finding["joints"]
+    return f"{finding['effect']} on {', '.join(joints) if len(joints) <= 3 else f'{len(joints)} joints'}"
+
+
+def markdown(head: tuple[str, ...], rows: Rows) -> str:
+    """A table."""
+    first, *rest = [f"| {' | '.join(row)} |" for row in (head, *rows)]
+    return "\n".join([first, "|" + "---|" * len(head), *rest])
+
+
+def section(name: str, every: Lines) -> dict[str, Any]:
+    """What the page says of a draw."""
+    lines = [x for x in every if x["diagnosis"]]
+    kinds = lambda line: [(c["kind"], c["how"]) for c in scoring.stated_classes(line) if c["slug"]]  # noqa: E731
+    return {
+        "name": name, "cases": len(every), "last": max(x["index"] for x in every), "diagnosed": len(lines),
+        "engine": engines(every), "seconds": f"{np.median([x['seconds'] for x in lines]):.0f}",
+        "figures": markdown(("measure", "figure (95 % interval)", "goal"), figures(lines)),
+        "coverage": markdown(("effect", "parameters", *(f"{100 * x:.0f} %" for x in LEVELS)), coverage(lines)),
+        "outcomes": markdown(("hidden", "times", *WAYS), tally(lines, kinds, WAYS)),
+        "places": markdown(("hidden", "times", *PLACES), tally(lines, scoring.located, PLACES)),
+        "false": markdown(("case", "hidden", "said", "probability"), false_rows(lines)),
+        "others": [f"{x['index']} ({' + '.join(x['kinds'])}): {x.get('refused') or x.get('failed')}"
+                   for x in every if not x["diagnosis"]],
+    }  # fmt: skip
+
+
+def engines(lines: Lines) -> str:
+    """The commits that diagnosed."""
+    return ", ".join(sorted({x.get("engine") or "unknown" for x in lines}))
+
+
+def main() -> None:
+    """Write the page and its figures."""
+    draws = {name: runner.read(runner.stored(name)) for name in ("final", "check", "work")}
+    draws = {name: every for name, every in draws.items() if any(x["diagnosis"] for x in every)}
+    looks = [runner.read(path) for path in sorted(runner.RESULTS.glob("testbed_check*.jsonl"))]
+    for name, every in draws.items():
+        diagram.draw([x for x in every if x["diagnosis"]], ROOT / "docs" / "figures" / f"calibration_{name}.svg")
+    probes = [x for x in runner.read(runner.RESULTS / "testbed_probes.jsonl") if x["diagnosis"]]
+    many = collections.Counter(cases.PASS)
+    head = ("probe", "false names", "noise over the sensors', largest", "90 % intervals that hold", "unexplained",
+            "unseen error over refit's", "verdict")  # fmt: skip
+    text = jinja2.Environment(keep_trailing_newline=True, trim_blocks=False).from_string(
+        (pathlib.Path(__file__).parent / "calibration.md.j2").read_text(encoding="utf-8")
+    ).render(
+        mixture=", ".join(f"{n} {name}" if n > 1 else name for name, n in many.items()),
+        looks=[{"engine": engines(look), "cases": len(look)} for look in looks],
+        draws=[section(name, every) for name, every in draws.items()],
+        probes=markdown(head, [probe_row(x) for x in probes]) if probes else "", probes_engine=engines(probes),
+    )  # fmt: skip
+    (ROOT / "docs" / "calibration.md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
