@@ -40,7 +40,7 @@ irb140 diagnose log.csv --robot arm.xml --columns map.toml --out d     other nam
 irb140 diagnose log.csv --out d --json > diagnosis.json          for a program"""
 
     recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
-    """Recordings (CSV, Parquet or NPZ), best of several motions."""
+    """Recordings (CSV, Parquet, NPZ, MAT, ROS bag, MCAP, LeRobot), best of several motions."""
 
     out: Out
     """Folder for diagnosis.json and report.html: new, empty, or a former diagnosis, which is replaced."""
