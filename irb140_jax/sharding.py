@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import PyTree
 
@@ -29,7 +30,8 @@ def sweep(one: Callable[..., PyTree], lanes: PyTree, *common: Any, mesh: Mesh | 
             they can't share evenly, the last lane is computed some more times, and left out of the results.
 
     Returns:
-        The results, lanes along the first axis; with a mesh they stay where they were computed.
+        The results, lanes along the first axis; with a mesh they stay where they were computed, unless its devices
+        can't share them evenly.
 
     Raises:
         InputError: Lanes of different numbers, or none.
@@ -41,7 +43,9 @@ def sweep(one: Callable[..., PyTree], lanes: PyTree, *common: Any, mesh: Mesh | 
     spare = -count % devices
     shared = _placed(_padded(lanes, spare), NamedSharding(mesh, PartitionSpec(axis)))
     found = _sweep_on(mesh, axis, one, shared, _placed(common, NamedSharding(mesh, PartitionSpec())))
-    return jax.tree.map(lambda x: x[:count], found) if spare else found
+    # An array that devices share evenly can't be cut unevenly where it is: each process takes a whole copy.
+    whole = lambda x: jnp.asarray(multihost_utils.process_allgather(x, tiled=True)[:count])  # noqa: E731
+    return jax.tree.map(whole, found) if spare else found
 
 
 def _padded(lanes: PyTree, spare: int) -> PyTree:
