@@ -17,8 +17,8 @@ R = TypeVar("R")
 def shape_checked(function: Callable[P, R]) -> Callable[P, R]:
     """A function whose first argument is a robot, its array arguments held against their annotated shapes.
 
-    Lists and tuples are taken as arrays.  What jaxtyping writes in signatures is read, so that nothing is stated twice.  Under `jax.jit` this costs nothing;
-    under `jax.vmap` the shapes are those of one sample, as annotated.
+    Lists and tuples are taken as arrays.  What jaxtyping writes in signatures is read, so that nothing is stated twice.
+    Under `jax.jit` this costs nothing; under `jax.vmap` the shapes are those of one sample, as annotated.
     """
     parameters = list(inspect.signature(function).parameters.values())
     wanted = {p.name: p.annotation.dim_str.split() for p in parameters if hasattr(p.annotation, "dim_str")}

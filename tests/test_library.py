@@ -105,7 +105,7 @@ def _wrong_rows(robot):
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
-        (lambda r: irb.dynamics.mass_matrix(r, jnp.zeros(5)), r"mass_matrix: q has shape \(5,\); give \(2,\) for a robot"),
+        (lambda r: irb.dynamics.mass_matrix(r, jnp.zeros(5)), r"mass_matrix: q has shape \(5,\); give \(2,\) for"),
         (lambda r: irb.dynamics.mass_matrix(r, jnp.zeros((9, 2))), r"q has shape \(9, 2\); give \(2,\).*jax.vmap"),
         (lambda r: irb.dynamics.passive_torque(r, jnp.zeros(2), qd=jnp.zeros(3)), r"qd has shape \(3,\)"),
         (_wrong_rows, r"qd has shape \(5, 2\); give \(4, 2\)"),
