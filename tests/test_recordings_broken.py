@@ -18,11 +18,11 @@ import pytest
 from test_recordings_formats import WRITERS
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.formats import options
+from irb140_jax.recordings.formats import mat_worker, options
 from irb140_jax.recordings.read import unchecked_recording
 
 JOINTS = ("shoulder", "elbow", "wrist")
-SEEDS = 25  # broken copies of each file
+SEEDS, SEEDS_OF_MAT = 25, 4  # broken copies of each file; MAT is read by a process of its own, which takes longer
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_whatever_breaks_in_a_file_it_is_read_or_refused_in_one_line(sound, tmp_
     path = write(sound, tmp_path)
     (tmp_path / "map.toml").write_text(lines or "")
     content, rng = path.read_bytes(), random.Random(kind)
-    for _ in range(SEEDS):
+    for _ in range(SEEDS_OF_MAT if kind.startswith("mat") else SEEDS):
         path.write_bytes(broken(content, rng))
         try:
             recording = unchecked_recording(path, JOINTS, tmp_path / "map.toml")
@@ -72,6 +72,13 @@ def test_whatever_breaks_in_a_file_it_is_read_or_refused_in_one_line(sound, tmp_
             assert "\n" not in str(error)
         else:  # what a flipped digit makes is a number
             assert np.isfinite(recording.q).all() and np.isfinite(recording.tau).all()
+
+
+def test_a_reader_that_crashes_takes_nobody_with_it(sound, tmp_path, monkeypatch):
+    path = formats.write_mat(sound, tmp_path / "log.mat")
+    (tmp_path / "worker.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGBUS)\n")
+    monkeypatch.setattr(mat_worker, "__file__", str(tmp_path / "worker.py"))
+    assert "its reader does not survive" in refusal(path)
 
 
 def test_the_database_of_a_bag_that_is_cut_off_is_refused(sound, tmp_path):

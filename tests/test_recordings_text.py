@@ -91,7 +91,7 @@ def test_a_row_of_units_is_applied_and_stated(frame, sound, tmp_path):
     row = ",".join(units.get(name, "[Nm]" if "tau" in name else "[rad]") for name in table)
     again = read(tmp_path, f"{head}\n{row}\n{rest}")
     assert_same(again, sound)
-    assert "q.elbow is in deg by the file's own header, and was converted" in again.notes
+    assert "Converted from deg, by the file's own header: q.elbow" in again.notes
 
 
 def test_a_unit_in_brackets_behind_a_name_is_applied_and_stated(frame, sound, tmp_path):

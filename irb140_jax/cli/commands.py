@@ -7,6 +7,7 @@ from tyro.conf import subcommand
 from irb140_jax.cli.demo import Demo
 from irb140_jax.cli.diagnose import Diagnose
 from irb140_jax.cli.excite import Excite
+from irb140_jax.cli.inspect import Inspect
 from irb140_jax.cli.predict import Predict
 
 COMMANDS = (
@@ -14,6 +15,7 @@ COMMANDS = (
     Predict,
     Demo,
     Excite,
+    Inspect,
 )
 
 # One of them, each called as its class in small letters.

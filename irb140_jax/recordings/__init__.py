@@ -1,5 +1,7 @@
 """Recordings: reading, checking, conditioning, excitation, and recordings with concealed physics."""
 
+from irb140_jax.recordings.inspection import Inspection as Inspection
+from irb140_jax.recordings.inspection import inspect_recording as inspect_recording
 from irb140_jax.recordings.read import read_recording as read_recording
 from irb140_jax.recordings.read import recorded_joints as recorded_joints
 from irb140_jax.recordings.recording import Recording as Recording

@@ -56,7 +56,7 @@ def explained_shares(seen: Glance, model: Torques) -> np.ndarray:
     """
     n = seen.q.shape[1]
     centred = lambda x: x - x.mean(axis=0)  # noqa: E731
-    features = [np.stack([model.gravity[:, j], model.moving[:, j], *_own_motion(seen, j)], axis=1) for j in range(n)]
+    features = [np.stack([model.gravity[:, j], model.moving[:, j], *own_motion(seen, j)], axis=1) for j in range(n)]
     targets = centred(seen.tau)
     return np.array([[_non_negative_share(centred(features[j]), targets[:, k]) for k in range(n)] for j in range(n)])
 
@@ -78,12 +78,12 @@ def motion_shares(seen: Glance, model: Torques) -> tuple[np.ndarray, np.ndarray]
     targets, shares = left(seen.tau), np.zeros((2, n))
     for j in range(n):
         if np.var(targets[:, j]) > 0.05 * np.var(seen.tau[:, j]):
-            features = left(np.stack([model.moving[:, j], *_own_motion(seen, j)], axis=1))
+            features = left(np.stack([model.moving[:, j], *own_motion(seen, j)], axis=1))
             shares[:, j] = [_non_negative_share(features, sign * targets[:, j]) for sign in (1, -1)]
     return shares[0], shares[1]
 
 
-def _own_motion(seen: Glance, j: int) -> tuple[np.ndarray, ...]:
+def own_motion(seen: Glance, j: int) -> tuple[np.ndarray, ...]:
     """Viscous friction, dry friction and rotor inertia of joint j, to scale."""
     slow = 0.02 * np.abs(seen.qd[:, j]).max() + 1e-12
     return seen.qd[:, j], np.tanh(seen.qd[:, j] / slow), seen.qdd[:, j]

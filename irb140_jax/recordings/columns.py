@@ -149,12 +149,15 @@ def scaled(
     """
     result = dict(table)
     scale = columns.values("scale")
+    converted: dict[str, list[str]] = {}
     for channel in result:
         unit = scale.get(channel, stated.get(channel) if channel in _judged(result) else None)
         if channel not in scale and isinstance(unit, str) and UNITS.get(unit) != 1.0:
-            notes.append(f"{channel} is in {unit} by the file's own header, and was converted")
+            converted.setdefault(unit, []).append(channel)
         with np.errstate(over="ignore", invalid="ignore"):  # broken numbers are found later, with their row
             result[channel] = result[channel] * _factor(channel, unit, columns)
+    notes += [f"Converted from {unit}, by the file's own header: {', '.join(channels)}"
+              for unit, channels in converted.items()]
     _to_joint_side(result, columns)
     if columns.coupling is not None:
         _uncouple(result, columns.coupling, columns.source)

@@ -184,6 +184,12 @@ def _numbers(
     return numbers
 
 
+def as_numbers(table: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[str]]:
+    """The columns that hold numbers, as floats, and a note on each that does not."""
+    notes: list[str] = []
+    return _numbers(table, [], pathlib.Path(), notes), notes
+
+
 def _as_floats(values: np.ndarray) -> tuple[np.ndarray, int | None]:
     """Floats of an array of objects, and the index of the first that is none."""
     converted = np.full(len(values), np.nan)

@@ -2,18 +2,22 @@
 
 import math
 import pathlib
+import subprocess
+import sys
+import tempfile
 import zipfile
-from typing import Any
 
 import numpy as np
 
 from irb140_jax.errors import RecordingError
+from irb140_jax.recordings.formats import mat_worker
 from irb140_jax.recordings.formats.extra import library
 from irb140_jax.recordings.formats.opened import refuse_encrypted
 from irb140_jax.recordings.formats.options import MAX_BYTES, MAX_VALUES, Table
 
-MAX_MEMBERS, MAX_DEPTH = 10_000, 8  # arrays of a file; structs in structs
-HDF5 = b"\x89HDF\r\n\x1a\n"
+MAX_MEMBERS = 10_000  # arrays of a file
+MAX_SECONDS = 300  # for a MAT file; the largest allowed takes a tenth of it
+HDF5 = mat_worker.HDF5
 
 
 def npz_table(path: pathlib.Path, joint_names: tuple[str, ...]) -> Table:
@@ -62,13 +66,11 @@ def _npz_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, where: str) -> n
 
 def mat_table(path: pathlib.Path, joint_names: tuple[str, ...]) -> Table:
     """Read MAT: vectors, matrices with one column a joint, and structs of these, named `struct.field`."""
-    with path.open("rb") as file:
-        since_73 = HDF5 in file.read(1024)
-    arrays, notes = _hdf5_arrays(path) if since_73 else _mat_arrays(path)
+    arrays, notes = _mat_arrays(path)
     longest = max((max(a.shape) for a in arrays.values()), default=0)
     # MATLAB's vectors are matrices of one row or column, and its logs may lie.
-    upright = {name: a.T if a.ndim == 2 and a.shape[1] == longest > a.shape[0] else a for name, a in arrays.items()}
-    columns = {name: a[:, 0] if a.ndim == 2 and a.shape[1] == 1 else a for name, a in upright.items()}
+    upright = {name: a.T if a.shape[1] == longest > a.shape[0] else a for name, a in arrays.items()}
+    columns = {name: a[:, 0] if a.shape[1] == 1 else a for name, a in upright.items()}
     samples = {name: a for name, a in columns.items() if len(a) == longest}
     if left := sorted(columns.keys() - samples.keys()):
         notes.append(f"Left out what has no value a sample: {', '.join(left[:6])}{' ...' if len(left) > 6 else ''}")
@@ -77,48 +79,24 @@ def mat_table(path: pathlib.Path, joint_names: tuple[str, ...]) -> Table:
 
 
 def _mat_arrays(path: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str]]:
-    from scipy import io
-
-    declared = sum(math.prod(shape) for _, shape, _ in io.whosmat(path))
-    if declared > MAX_VALUES:
-        raise RecordingError(f"{path}: declares {declared:.3g} values; allowed are {MAX_VALUES:.0g}: it is damaged, or "
-                             "has to be cut into shorter recordings")
-    content = io.loadmat(path, squeeze_me=False, struct_as_record=False)
-    return _flat({name: value for name, value in content.items() if not name.startswith("__")})
-
-
-def _flat(content: dict[str, Any], before: str = "", depth: int = 0) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Arrays of numbers in structs within structs, and a note on what is none."""
-    arrays, notes = {}, []
-    for name, value in content.items():
-        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim == 2 and value.size:
-            arrays[before + name] = value
-            continue
-        inner = value.flat[0] if isinstance(value, np.ndarray) and value.dtype == object and value.size == 1 else value
-        fields = getattr(inner, "_fieldnames", None)
-        if fields and depth < MAX_DEPTH:
-            more = _flat({field: getattr(inner, field) for field in fields}, f"{before}{name}.", depth + 1)
-            arrays, notes = arrays | more[0], notes + more[1]
-        else:
-            notes.append(f"'{before}{name}' is no array of numbers and is left out")
-    return arrays, notes
-
-
-def _hdf5_arrays(path: pathlib.Path) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Numbers of a MAT file since version 7.3, which is HDF5 and holds matrices transposed."""
-    h5py = library("h5py", f"{path}: a MAT file of version 7.3 needs h5py")
-    arrays: dict[str, np.ndarray] = {}
-    with h5py.File(path, "r") as file:
-        found = []
-        file.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) else None)
-        if sum(math.prod(item.shape or (0,)) for _, item in found) > MAX_VALUES or len(found) > MAX_MEMBERS:
-            raise RecordingError(f"{path}: declares more than {MAX_VALUES:.0g} values; it is damaged, or has to be cut "
-                                 "into shorter recordings")
-        for name, item in found:
-            if item.dtype.kind in "fiub" and len(item.shape or ()) in (1, 2) and not name.startswith("#"):
-                values = np.asarray(item[()])
-                arrays[name.replace("/", ".")] = values[:, None] if values.ndim == 1 else values.T
-    return arrays, []
+    """Arrays of a MAT file, each of two dimensions, read by a process of its own: see `mat_worker`."""
+    with path.open("rb") as file:
+        if HDF5 in file.read(1024):
+            library("h5py", f"{path}: a MAT file of version 7.3 needs h5py")
+    with tempfile.TemporaryDirectory() as folder:
+        out = pathlib.Path(folder) / "arrays.npz"
+        command = [sys.executable, mat_worker.__file__, str(path.resolve()), str(out), str(MAX_VALUES)]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=MAX_SECONDS, check=False)
+        except subprocess.TimeoutExpired:
+            raise RecordingError(f"{path}: can't be read within {MAX_SECONDS} s; it is damaged: save it again, or as "
+                                 "Parquet or NPZ") from None
+        if done.returncode:
+            reason = (done.stderr.strip().splitlines() or ["it is damaged"])[-1] if done.returncode > 0 else (
+                "it is damaged in a way that its reader does not survive")  # fmt: skip
+            raise RecordingError(f"{path}: can't read this as MAT: {reason[:200]}; save it again, or as Parquet or NPZ")
+        with np.load(out) as arrays:
+            return {name.removeprefix("array "): arrays[name] for name in arrays.files}, done.stdout.splitlines()
 
 
 def array_columns(

@@ -1,0 +1,61 @@
+"""irb140 inspect."""
+
+import dataclasses
+import pathlib
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from irb140_jax.cli.options import Columns
+from irb140_jax.cli.shown import console
+from irb140_jax.errors import InputError
+
+if TYPE_CHECKING:
+    from irb140_jax.recordings.inspection import Inspection
+
+
+@dataclasses.dataclass(frozen=True)
+class Inspect:
+    """Look at recordings of any format: channels, likely units, doubts; write a column map to start from."""
+
+    recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
+    """Recordings: CSV, Parquet, NPZ, MAT, ROS bags, MCAP, LeRobot."""
+
+    robot: Annotated[pathlib.Path | None, arg(metavar="MODEL.xml")] = None
+    """MJCF or URDF of the robot: names the joints, and tells the units of torques."""
+
+    columns: Columns = None
+    """TOML file that maps other column names and units, to begin with and to be tried."""
+
+    write_columns: Annotated[pathlib.Path | None, arg(metavar="FILE.toml")] = None
+    """Write the column map that was guessed from the first recording."""
+
+    def run(self) -> None:
+        if not self.recordings:
+            raise InputError("inspect: no recording was named; give at least one: irb140 inspect REC")
+        if self.write_columns is None:
+            self._show()
+            return
+        from irb140_jax.report import results_file
+
+        out = self.write_columns
+        if out.is_dir() or out.exists() and out.stat().st_size:
+            raise InputError(f"--write-columns {out}: this is there already, and a map may hold what you know; name "
+                             "another file, or move it away")
+        inputs = [path for path in (*self.recordings, self.robot, self.columns) if path]
+        with results_file(out, lambda path: False, inputs) as results:
+            text = self._show()[0].map
+            results.write(lambda folder: (folder / results.name).write_text(text, encoding="utf-8"))
+        print(f"{out}: check every line, then: irb140 diagnose {self.recordings[0]} --columns {out} "
+              f"{f'--robot {self.robot} ' if self.robot else ''}--out DIR")
+
+    def _show(self) -> list["Inspection"]:
+        from irb140_jax.recordings.inspection import inspect_recording
+        from irb140_jax.report.inspection import print_inspection
+        from irb140_jax.robot import load_robot
+
+        robot = load_robot(self.robot) if self.robot else None
+        looks = [inspect_recording(path, robot, self.columns) for path in self.recordings]
+        for look in looks:
+            print_inspection(look, console())
+        return looks
