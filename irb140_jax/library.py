@@ -145,4 +145,4 @@ def _robot(robot: Path | Robot | None) -> Robot:
     """The robot meant."""
     if robot is None:
         return irb140()
-    return robot if isinstance(robot, Robot) else load_robot(robot)
+    return robot if isinstance(robot, Robot) else load_robot(pathlib.Path(robot))

@@ -99,7 +99,7 @@ def test_the_version_is_that_of_the_project():
 
 
 def _wrong_rows(robot):
-    return irb.dynamics.inverse_dynamics_batch(robot, *[np.zeros((rows, 2)) for rows in (4, 5, 4)])
+    return irb.dynamics.inverse_dynamics_batch(robot, *[jnp.zeros((rows, 2)) for rows in (4, 5, 4)])
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def _wrong_rows(robot):
         (lambda r: irb.dynamics.mass_matrix(r, jnp.zeros((9, 2))), r"q has shape \(9, 2\); give \(2,\).*jax.vmap"),
         (lambda r: irb.dynamics.passive_torque(r, jnp.zeros(2), qd=jnp.zeros(3)), r"qd has shape \(3,\)"),
         (_wrong_rows, r"qd has shape \(5, 2\); give \(4, 2\)"),
-        (lambda r: irb.kinematics.forward_kinematics(r, 0.0), r"q has shape \(\); give \(2,\)"),
+        (lambda r: irb.kinematics.forward_kinematics(r, jnp.array(0.0)), r"q has shape \(\); give \(2,\)"),
     ],
 )
 def test_a_wrong_shape_gets_a_sentence_that_names_argument_and_shapes(model, call, sentence):

@@ -3,6 +3,7 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from irb140_jax.errors import RobotError
@@ -128,7 +129,7 @@ class Robot(eqx.Module):
     def _repr_html_(self) -> str:
         """The joints as a table, for notebooks."""
         columns = (self.lower, self.upper, self.velocity_limit, self.effort_limit, self.mass)
-        if any(isinstance(column, jax.core.Tracer) or jnp.ndim(column) != 1 for column in columns):
+        if any(not eqx.is_array(column) or isinstance(column, Tracer) or jnp.ndim(column) != 1 for column in columns):
             return table_html(("joint",), [(name,) for name in self.joint_names], f"{self.name}, batched or traced")
         kinds = ["slide" if slide else "hinge" for slide in self.is_slide]
         numbers = ([f"{float(x):.4g}" for x in column] for column in columns)
