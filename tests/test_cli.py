@@ -5,6 +5,7 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -19,9 +20,12 @@ from helpers_cli import MODEL, recording, refused, stub, table  # noqa: F401
 import irb140_jax.mismatch
 import irb140_jax.recordings
 from irb140_jax import cli
+from irb140_jax.cli.diagnose import STEPS
+from irb140_jax.cli.parsing import parsed
+from irb140_jax.cli.shown import Share
 from irb140_jax.errors import InputError
 
-COMMANDS = ("diagnose", "predict", "demo", "excite")
+COMMANDS = ("diagnose", "predict", "demo", "excite", "inspect")
 
 
 def irb140(*words, cwd=None) -> subprocess.CompletedProcess:
@@ -42,8 +46,8 @@ def test_the_help_has_one_line_for_every_command():
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("diagnose", ["REC", "--out", "--robot", "--inertial-uncertainty", "0.05", "--columns"]),
-        ("predict", ["DIR", "REC", "--out", "--columns"]),
+        ("diagnose", ["REC", "--out", "--robot", "--inertial-uncertainty", "0.05", "--columns", "--json"]),
+        ("predict", ["DIR", "REC", "--out", "--columns", "--measured"]),
         ("demo", ["--seed", "--out"]),
         ("excite", ["DIR", "--out"]),
     ],
@@ -256,7 +260,7 @@ def test_demo_shows_the_seal_then_diagnoses_files_then_reveals_the_truth(table, 
         "recordings/fast.csv", "recordings/slow.csv",
     }  # fmt: skip
     assert json.loads((out / "truth.json").read_text())["effects"] == [hidden]
-    assert "What was hidden, what was found" in (out / "report.html").read_text(encoding="utf-8")
+    assert "The truth: what was hidden" in (out / "report.html").read_text(encoding="utf-8")
     np.testing.assert_allclose(stub["recordings"][0].q, channels["q"], atol=1e-8)  # read back from the file
 
 
@@ -281,3 +285,42 @@ def test_progress_is_told_in_plain_lines_where_stderr_is_no_terminal(recording, 
     monkeypatch.setattr(irb140_jax.mismatch, "diagnose", diagnose)
     assert cli.main(["diagnose", str(recording), "--out", str(tmp_path / "d")]) == 0
     assert capsys.readouterr().err.splitlines() == ["first", "second", "third"]
+
+
+def test_the_share_done_and_the_time_left_are_told_as_far_as_they_are_known():
+    now = iter([0.0, 20.0, 100.0, 160.0])
+    share = Share({"second step": 0.1, "third step": 0.5, "fourth step": 0.95}, lambda: next(now))
+    assert share.with_share("the first step") == "the first step"
+    assert share.with_share("the second step") == "the second step (10% done, about 3 min left)"
+    assert share.with_share("the third step again") == "the third step again (50% done, about 2 min left)"
+    assert share.with_share("the fourth step") == "the fourth step (95% done, some seconds left)"
+
+
+def test_the_steps_of_which_the_share_is_known_are_those_that_a_diagnosis_tells():
+    told = " ".join(path.read_text() for path in (MODEL.parents[1] / "irb140_jax" / "mismatch").glob("*.py"))
+    for words in STEPS:
+        assert re.sub(r" \(round \d\)", " (round {turn})", words) in told, words
+
+
+def test_json_is_all_that_stdout_holds(recording, tmp_path, stub, capsys):
+    assert cli.main(["diagnose", str(recording), "--out", str(tmp_path / "d"), "--json"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out) == json.loads((tmp_path / "d" / "diagnosis.json").read_text())
+    assert "Physics left out." in said.err and "Report:" in said.err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_a_command_ends_with_lines_that_work(command, capsys):
+    with pytest.raises(SystemExit):
+        cli.main([command, "--help"])
+    lines = capsys.readouterr().out.split("examples:\n")[1].splitlines()
+    assert len(lines) >= 2
+    for line in lines:
+        words = shlex.split(re.split(r"\s{3,}| > ", line.strip())[0])
+        assert words[0] == "irb140" and type(parsed(words[1:])).__name__.lower() == words[1]
+
+
+def test_the_version_is_told(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["--version"])
+    assert stop.value.code == 0 and re.fullmatch(r"irb140 \d+\.\d+\.\d+\n", capsys.readouterr().out)

@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 
+import helpers_stored
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from irb140_jax import cli
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch import diagnose, load_undecided, propose, save
+from irb140_jax.mismatch import design, diagnose, load_undecided, propose, save
 from irb140_jax.mismatch.questions import Questions
 from irb140_jax.mismatch.testable import VISIBLE
 from irb140_jax.mismatch.undecided import Pair, save_undecided
@@ -207,6 +208,24 @@ def test_excite_refuses_a_folder_without_a_diagnosis(tmp_path, capsys):
     assert "model.json" in capsys.readouterr().err
 
 
+def test_the_search_ends_where_its_budget_does(monkeypatch):
+    spent = []
+    for most in (0, 200, design.MOST_COMPARISONS):
+        monkeypatch.setattr(design, "MOST_COMPARISONS", most)
+        margins, real = [], Questions.margin
+
+        def margin(self, *args, margins=margins, real=real, **kwargs):
+            margins.append(1)
+            return real(self, *args, **kwargs)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(Questions, "margin", margin)
+            made = propose(helpers_stored.model().robot, helpers_stored.open_questions(), seed=1, rate=50.0)
+        assert len(made.pieces) == 4
+        spent.append(len(margins))
+    assert spent[0] < 20 < spent[1] < 220 < spent[2]
+
+
 def test_a_motion_of_another_step_is_not_recorded():
     with pytest.raises(InputError, match="sample it every"):
         record_again(slow_case()[0], [fourier_motion(arm()[1], 2.0, 100.0, seed=1)], seed=1)
@@ -215,11 +234,15 @@ def test_a_motion_of_another_step_is_not_recorded():
 def test_the_sentences_say_what_is_separated_and_what_is_not():
     open_ = undecided_pair()
     seen = (9.0,) * len(open_.hidden)
-    made = dataclasses.replace(proposal(), odds_now=(0.5,), odds=(40.0,), seen=seen)
+    made = dataclasses.replace(proposal(), odds_now=(0.5,), odds=(40.0,), exact=(50.0,), seen=seen)
     said = " ".join(proposal_sentences(arm()[1], open_, made))
     assert "On joint2, Coulomb friction or" in said and "odds of 40 at least" in said and "against 0.5 by" in said
     failed = dataclasses.replace(made, odds=(1.0,))
-    assert "no motion that was tried separates them" in " ".join(proposal_sentences(arm()[1], open_, failed))
+    said = " ".join(proposal_sentences(arm()[1], open_, failed))
+    assert "no motion that was tried separates them" in said and "less than a real joint departs from" in said
+    alike = dataclasses.replace(failed, exact=(1.0,), tried=52, too_strong=7)
+    said = " ".join(proposal_sentences(arm()[1], open_, alike))
+    assert "along all 45 pieces" in said and "7 more need more torque" in said and "can explain what the other" in said
     nothing = dataclasses.replace(open_, pairs=(), hidden=())
-    none = dataclasses.replace(made, odds_now=(), odds=(), seen=())
+    none = dataclasses.replace(made, odds_now=(), odds=(), exact=(), seen=())
     assert "left nothing open" in " ".join(proposal_sentences(arm()[1], nothing, none))

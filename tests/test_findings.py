@@ -28,4 +28,4 @@ def test_a_rival_is_as_good_where_the_laws_in_its_place_could_feign_the_differen
     odds, stays = _rivals(ex, 1)
     gain, spring = (odds[slug, (0,)] for slug in ("torque_gain", "gravity_spring"))
     assert there.odds((), (1,)) - there.odds((), (2,)) > 5.0
-    assert (spring == pytest.approx(gain)) == open_ and not stays
+    assert (gain - np.log(20.0) < spring < gain) == open_ and not stays

@@ -1,10 +1,10 @@
 """irb140 demo."""
 
 import dataclasses
-import json
 import pathlib
 import shutil
-from typing import TYPE_CHECKING, Annotated
+from json import dumps
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import arg
 
@@ -22,11 +22,18 @@ if TYPE_CHECKING:
 class Demo:
     """Hide an effect, diagnose blind, then reveal the truth."""
 
+    EXAMPLES: ClassVar = """\
+irb140 demo                         into irb140-demo-0
+irb140 demo --seed 7 --out demo     another effect, joint and strength"""
+
     seed: int = 0
     """Draws the effect, its joint and strength, the wrong inertials, the motions and the noise."""
 
     out: Annotated[pathlib.Path | None, arg(metavar="DIR")] = None
     """Folder for recordings, diagnosis, report and truth; by default irb140-demo-SEED in the current one."""
+
+    json: bool = False
+    """Print diagnosis.json, and what is meant for people to stderr."""
 
     def run(self) -> None:
         if self.seed < 0:
@@ -44,14 +51,14 @@ class Demo:
         with progress() as tell:
             tell("MuJoCo drives an arm with something hidden in it")
             case = demo_case(self.seed)
-        terminal = console()
+        terminal = console(stderr=self.json)
         said = f"Something may be hidden in these recordings. SHA-256 of the truth: {case.seal}"
         terminal.print(said, soft_wrap=True)
         result = _from_files(case, results.desk)
         reveal = revealed(case.truth["effects"], result.diagnosis, case.seal)
         folder = results.write(lambda folder: _write(result, reveal, case, results.desk, folder, out))
         tell_kept(results)
-        show(result, out if folder == results.folder else folder)
+        show(result, out if folder == results.folder else folder, json=self.json)
         print_reveal(reveal, terminal)
 
 
@@ -80,4 +87,4 @@ def _write(
     save(result, folder)
     (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal, out), encoding="utf-8")
     truth = case.truth | {"sealed": sealed(case.truth), "seal": case.seal}
-    (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")
+    (folder / "truth.json").write_text(dumps(truth, indent=1) + "\n", encoding="utf-8")

@@ -2,7 +2,7 @@
 
 import dataclasses
 import pathlib
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
@@ -17,6 +17,11 @@ if TYPE_CHECKING:
 @dataclasses.dataclass(frozen=True)
 class Inspect:
     """Look at recordings of any format: channels, likely units, doubts; write a column map to start from."""
+
+    EXAMPLES: ClassVar = """\
+irb140 inspect log.csv                                                what is in it, in which units
+irb140 inspect log.mcap --robot arm.urdf --write-columns map.toml     a map to check and to go on with
+irb140 inspect log.csv --robot arm.urdf --columns map.toml            the log as the map has it"""
 
     recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
     """Recordings: CSV, Parquet, NPZ, MAT, ROS bags, MCAP, LeRobot."""
@@ -54,8 +59,14 @@ class Inspect:
         from irb140_jax.report.inspection import print_inspection
         from irb140_jax.robot import load_robot
 
-        robot = load_robot(self.robot) if self.robot else None
+        robot = load_robot(self.robot, fix_base=True) if self.robot else None
         looks = [inspect_recording(path, robot, self.columns) for path in self.recordings]
+        if self.robot and robot is not None:  # joints without channels are held, as in a diagnosis
+            for i, look in enumerate(looks):
+                joints = [name for name in robot.joint_names if {f"q.{name}", f"tau.{name}"} <= look.names]
+                if 0 < len(joints) < robot.n:
+                    chosen = load_robot(self.robot, joints, fix_base=True)
+                    looks[i] = inspect_recording(self.recordings[i], chosen, self.columns)
         for look in looks:
             print_inspection(look, console())
         return looks

@@ -2,7 +2,7 @@
 
 import dataclasses
 import pathlib
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
@@ -23,6 +23,11 @@ Table = dict[str, "np.ndarray"]
 @dataclasses.dataclass(frozen=True)
 class Predict:
     """Write the torque of diagnosed models along a recording."""
+
+    EXAMPLES: ClassVar = """\
+irb140 predict d new.csv --out torque.csv                 of another recording of the robot
+irb140 predict d motion.csv --out torque.csv              of a motion without torque, as excite writes it
+irb140 predict d new.csv --out torque.csv --measured      beside what was measured, for PlotJuggler"""
 
     folder: Folder
     """Folder of a diagnosis."""

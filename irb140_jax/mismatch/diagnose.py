@@ -12,6 +12,7 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
+from irb140_jax.mismatch.enough import sensor_scatter, undecidable
 from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, explained_by, fitted, full_posterior
 from irb140_jax.mismatch.findings import findings, ranking
@@ -28,6 +29,7 @@ from irb140_jax.recordings.check import MOVING
 from irb140_jax.recordings.condition import choose_band, conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.repeats import with_motions_numbered, without_copies
 from irb140_jax.robot import Robot
 
 SCHEMA = 2  # of diagnosis.json
@@ -104,9 +106,10 @@ def _diagnosed(
 ) -> Result:
     moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
     recordings = [with_lost_torque_marked(_finite(r), moves) for r in recordings]
+    recordings, twice = without_copies(recordings)
     progress("smoothing and differentiating the positions")
     band = choose_band(list(recordings), robot)
-    smooth = conditioned(recordings, band)
+    smooth, again = with_motions_numbered(conditioned(recordings, band), recordings)
     rows = [len(band.kept(len(r.t))) for r in smooth]
     if sum(rows) < FEWEST_ROWS or min(rows) < FEWEST_ROWS // 5:
         raise RecordingError(
@@ -128,7 +131,10 @@ def _diagnosed(
     usable = np.sum([r.usable[band.kept(len(r.t))].sum(axis=0) for r in smooth], axis=0)
     said = notes(robot, smooth, band, config.inertial_uncertainty, usable, proof.judged)
     origin = provenance(robot, recordings, config.options, config.words)
-    diagnosis = _document(robot, ex, proof, found, rest, seen, said, origin)
+    scatter = sensor_scatter(robot, recordings, smooth, band)
+    missing = undecidable(robot, proof, [s.tau for s in ex.data.stretches], scatter, band)
+    said = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()] + twice + again + said
+    diagnosis = _document(robot, ex, proof, scatter, found, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said), open_)
 
@@ -170,12 +176,13 @@ def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band) -> Corrected
 
 
 def _document(
-    robot: Robot, ex: Explanation, proof: HeldOut, found: list[dict[str, Any]], rest: list[Unexplained],
-    seen: dict[Site, tuple[float, int]], said: list[str], origin: dict[str, Any],
+    robot: Robot, ex: Explanation, proof: HeldOut, scatter: np.ndarray, found: list[dict[str, Any]],
+    rest: list[Unexplained], missing: dict[int, str], seen: dict[Site, tuple[float, int]], said: list[str],
+    origin: dict[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
-    fit = _fit(robot, proof, rest)
+    fit = _fit(robot, proof, scatter)
     inertials = inertial_views(robot, ex)
-    kind = verdict(ex, proof, found, rest)
+    kind = verdict(ex, proof, found, rest, missing)
     sources = [r["file"] for r in origin["recordings"]]
     return rounded({
         "schema": SCHEMA,
@@ -186,19 +193,15 @@ def _document(
         "fit": fit,
         "notes": said,
         "provenance": origin,
-        "summary": summary(kind, found, rest, fit, inertials, robot, sources),
+        "summary": summary(kind, found, rest, fit, inertials, robot, sources, [*missing.values()]),
     })  # fmt: skip
 
 
-def _fit(robot: Robot, proof: HeldOut, rest: list[Unexplained]) -> dict[str, dict[str, float | None]]:
-    """Errors on unseen data and the noise, by joint; none where a joint was not judged."""
-    # Noise is what nothing predicts: less than what the findings leave, where structure without a name is left.
-    floor = proof.floor.copy()
-    for u in rest:
-        floor[u.joint] *= np.sqrt(max(1.0 - u.share, 0.0))
+def _fit(robot: Robot, proof: HeldOut, scatter: np.ndarray) -> dict[str, dict[str, float | None]]:
+    """Errors on unseen data and what the sensors scatter by, by joint; none where a joint was not judged."""
     columns = {
         "rmse_nominal": proof.rmse(proof.nominal), "rmse_refit": proof.rmse(proof.refit),
-        "rmse_corrected": proof.rmse(proof.corrected), "noise_floor": floor,
+        "rmse_corrected": proof.rmse(proof.corrected), "noise_floor": scatter,
     }  # fmt: skip
     return {
         name: {key: float(column[j]) if proof.judged[j] else None for key, column in columns.items()}

@@ -85,6 +85,8 @@ def _grams_of_joint(
     for s in stretches:
         A = np.concatenate([s.X[:, j][:, active] * scale[active], s.y[:, j : j + 1]], axis=1)
         A, usable = noise.whitened(A, j, s.recording, s.unsure[:, j]), noise.usable(s.use[:, j], j)
+        # What a law errs by comes back with the motion: played again, it is no more evidence.
+        A = A / np.sqrt(s.repeats)
         edges = np.linspace(0, len(A), blocks + 1).astype(int)
         for block in map(slice, edges[:-1], edges[1:]):
             part = A[block][usable[block]]

@@ -72,11 +72,14 @@ def _rivals(ex: Explanation, index: int) -> tuple[dict[Key, float], dict[Key, st
     odds[mine] = own
     stays: dict[Key, str] = {}
     for key, (value, special) in _pairs(ex, rest, c).items():
-        if min(value, own) > odds.get(key, -np.inf):
-            odds[key], stays[key] = min(value, own), special
+        if value > odds.get(key, -np.inf):
+            odds[key], stays[key] = value, special
+    # What the search preferred by its own rules is at least as probable as what it did not take.  Rivals keep their
+    # odds against each other: were each held down to the finding's, all would share alike, the hopeless ones too.
+    above = max(max(odds.values()) - own, 0.0)
+    odds = {key: value if key == mine else value - above for key, value in odds.items()}
     odds["", ()] = 0.0
-    # What the search preferred by its own rules is at least as probable as what it did not take.
-    return {key: value if key == mine else min(value, own) for key, value in odds.items()}, stays
+    return odds, stays
 
 
 def _fair(
@@ -109,10 +112,12 @@ def _fair(
         guard = feigned(ex.chosen)
         hurdle = guard + PREFER
         return own + min(excess, 0.0) - PREFER * guard / hurdle * (1.0 - max(excess, 0.0) / hurdle)
-    # Within what imperfect laws could feign, a rival is as good as the named law: of the laws that there would be in
-    # its place.  A torque constant that the inertials absorb but for a hundredth explains far more than what tells it
-    # from others.
-    return own if np.isfinite(value) and -excess <= feigned((*others(ex, index), best[1])) else value
+    # Within what imperfect laws could feign, a rival is nearly as good as the named law: of the laws that there would
+    # be in its place.  A torque constant that the inertials absorb but for a hundredth explains far more than what
+    # tells it from others.  Log odds count in that unit: one of it is what a law needs to be preferred.
+    if not np.isfinite(value) or excess >= 0.0:
+        return value
+    return own + excess * PREFER / max(feigned((*others(ex, index), best[1])), PREFER)
 
 
 def _pairs(ex: Explanation, rest: tuple[int, ...], c: Candidate) -> dict[Key, tuple[float, str]]:

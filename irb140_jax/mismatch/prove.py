@@ -44,19 +44,26 @@ class HeldOut:
 
 
 def folds(ex: Explanation) -> list[np.ndarray]:
-    """Blocks to leave out together: a recording each, or contiguous blocks of the only one.
+    """Blocks to leave out together: a motion each, with all that repeat it, or contiguous blocks of the only one.
 
-    A recording that all but alone moves some joint, or all but alone holds what a finding does, is left out block by
+    A motion that all but alone moves some joint, or all but alone holds what a finding does, is left out block by
     block, too: without it nothing is known there, and a wall that is touched once would drown all else.
     """
     g = ex.grams
-    out, every, weight = [], np.arange(len(g.recording)), np.vstack([g.rows.T, _energy(ex, ex.chosen)])
+    out, weight = [], np.vstack([g.rows.T, _energy(ex, ex.chosen)])
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
-    for r in sorted(set(g.recording)):
-        mine = g.recording == r
+    of_recording = np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches])
+    motion, number = of_recording[g.recording], _number_within(g.recording)
+    for m in dict.fromkeys(motion.tolist()):
+        mine = motion == m
         alone = np.max(weight[:, mine].sum(axis=1)) > ALONE
-        out += [every == b for b in np.flatnonzero(mine)] if alone else [mine]
+        out += [mine & (number == k) for k in np.unique(number[mine])] if alone else [mine]
     return out
+
+
+def _number_within(recording: np.ndarray) -> np.ndarray:
+    """Number of each block within its recording, shape (blocks,)."""
+    return np.arange(len(recording)) - np.searchsorted(recording, recording)
 
 
 def _energy(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class Questions:
         first = 10 * robot.n + 10 * len(open_.loose) + np.concatenate([[0], np.cumsum(widths)]).astype(int)
         self._columns = [np.arange(a, a + w) for a, w in zip(first, widths, strict=False)]
         self._always = np.arange(first[0])
+        self._known: dict[Pair, tuple[_Order, _Order]] = {}
 
     def gram(self, motion: Excitation, effort_share: float = np.inf) -> np.ndarray | None:
         """What recording a motion would add, shape (K, K); None where it needs too much torque.
@@ -56,7 +58,7 @@ class Questions:
         noise = Noise(o.ar, o.level[None], o.level[None])
         return grams([dataclasses.replace(rows, X=X)], noise, scale, len(self._always), 1).total()[:-1, :-1]
 
-    def margin(self, added: np.ndarray, pair: Pair) -> float:
+    def margin(self, added: np.ndarray, pair: Pair, *, exact: bool = False) -> float:
         """Log odds expected in favour of the true one of two explanations, whichever is true, the worse of the two.
 
         The log that either predicts is added to the recordings there are; the other does with it what it can, with
@@ -64,31 +66,51 @@ class Questions:
         law could feign (`feigned`) is taken off as if all were one recording, so that the motion convinces without the
         others' help; below zero, they stay even.
 
+        Args:
+            added: What the motion adds, from `gram`.
+            pair: The explanations.
+            exact: Whether to take the laws as exact and take nothing off.
+
         Source: Atkinson and Fedorov, Biometrika 62(1), 1975; Lopez-Fidalgo, Tommasi, Trandafir, JRSS B 69(2), 2007.
         """
-        named, rival = (pair.named, pair.named_sets), (pair.rival, pair.rival_sets)
-        return min(self._odds_if_true(added, pair, *order) for order in ((named, rival), (rival, named)))
+        return min(self._odds_if_true(added, order, exact) for order in self._orders(pair))
 
-    def _odds_if_true(self, added: np.ndarray, pair: Pair, one: tuple[str, Sets], two: tuple[str, Sets]) -> float:
-        (slug, true), (rival, other) = one, two
+    def _orders(self, pair: Pair) -> tuple["_Order", "_Order"]:
+        """Either explanation as the true one; what doesn't depend on the motion is worked out once."""
+        if pair not in self._known:
+            named, rival = (pair.named, pair.named_sets), (pair.rival, pair.rival_sets)
+            self._known[pair] = self._order_of(pair, named, rival), self._order_of(pair, rival, named)
+        return self._known[pair]
+
+    def _order_of(self, pair: Pair, true: tuple[str, Sets], other: tuple[str, Sets]) -> "_Order":
         rest = np.concatenate([self._always, *(self._columns[c] for c in pair.rest)])
-        own = lambda s: np.concatenate([self._columns[c] for c in s])  # noqa: E731
+        own = lambda sets: [np.concatenate([self._columns[c] for c in s]) for s in sets]  # noqa: E731
+        truths, others = own(true[1]), own(other[1])
         old, _ = eliminated(self.open.gram, rest)
-        best = max(true, key=lambda s: gain_of(old, own(s)))
-        columns = np.concatenate([rest, own(best)])
-        w = posterior(self.open.gram, columns).mean
-        H = self.open.gram.copy()
-        H[:-1, :-1] += added
-        told = added[:, columns] @ w
+        best = max(truths, key=lambda columns: gain_of(old, columns))
+        columns = np.concatenate([rest, best])
+        # Of the whole matrix only what either explanation uses is needed.
+        kept = np.unique(np.concatenate([rest, *truths, *others]))
+        at = lambda columns: np.searchsorted(kept, columns)  # noqa: E731
+        feigned = max(CATALOGUE[slug].feigned for slug in (true[0], other[0])) ** 2
+        # A special case stands until the law that contains it has beaten that.
+        feigned = -feigned if true[0] in CATALOGUE[other[0]].contains else feigned
+        weights = posterior(self.open.gram, columns).mean
+        known = self.open.gram[np.ix_(np.append(kept, -1), np.append(kept, -1))]
+        own_at = at(rest), at(best), [*map(at, truths)], [*map(at, others)]
+        return _Order(kept, known, columns, weights, *own_at, feigned)
+
+    def _odds_if_true(self, added: np.ndarray, o: "_Order", exact: bool) -> float:
+        H = o.known.copy()
+        H[:-1, :-1] += added[np.ix_(o.kept, o.kept)]
+        told = added[np.ix_(o.kept, o.columns)] @ o.weights
         H[:-1, -1] += told
         H[-1, :-1] += told
-        left, _ = eliminated(H, rest)
-        mean = posterior(left, own(best)).mean
-        explained = 0.5 * float(mean @ H[np.ix_(own(best), own(best))] @ mean)
-        feigned = max(CATALOGUE[s].feigned for s in (slug, rival)) ** 2 * explained
-        # A special case stands until the law that contains it has beaten that.
-        handicap = -feigned if slug in CATALOGUE[rival].contains else feigned
-        return max(gain_of(left, own(s)) for s in true) - max(gain_of(left, own(s)) for s in other) - handicap
+        left, _ = eliminated(H, o.rest)
+        mean = posterior(left, o.best).mean
+        explained = 0.0 if exact else 0.5 * float(mean @ H[np.ix_(o.best, o.best)] @ mean)
+        gain = lambda sets: max(gain_of(left, s) for s in sets)  # noqa: E731
+        return gain(o.truths) - gain(o.others) - o.feigned * explained
 
     def visible(self, added: np.ndarray, columns: Sequence[int]) -> np.ndarray:
         """Standard deviations by which effects, at the strength of `testable`, would stand out; one for each column."""
@@ -99,6 +121,31 @@ class Questions:
         members = [self.open.columns[c] for c in self.open.chosen]
         at = lambda c: (self._columns[c], strength[self._columns[c] - self._always.size])  # noqa: E731
         return np.array([stands_out(left, self.open.columns[c], *at(c), members) for c in columns])
+
+
+class _Order(NamedTuple):
+    """One of two explanations as the true one; indices are among the columns kept, unless it says otherwise.
+
+    Attributes:
+        kept: Columns of the whole matrix that matter.
+        known: What the recordings say of those and y.
+        columns: Of the true explanation at its best shape, in the whole matrix.
+        weights: Their amplitudes.
+        rest: Columns of both explanations.
+        best: Columns of the true one alone at its best shape.
+        truths, others: Columns of the true and of the other one alone, for every shape.
+        feigned: Share of what is explained that an imperfect law could feign, squared; below zero in its favour.
+    """
+
+    kept: np.ndarray
+    known: np.ndarray
+    columns: np.ndarray
+    weights: np.ndarray
+    rest: np.ndarray
+    best: np.ndarray
+    truths: list[np.ndarray]
+    others: list[np.ndarray]
+    feigned: float
 
 
 def _library(robot: Robot, open_: Undecided) -> tuple[Library, np.ndarray]:

@@ -29,6 +29,7 @@ class Stretch:
         unsure: Standard deviation that the samples of the log leave open of tau, (R, n); see `Conditioned`.
         use: Rows in which the joint moves and nothing is lost, (R, n).
         q, qd, qdd: Motion at the rows, (R, n), for maps and the flexible competitor.
+        motion, repeats: Which motion it is of, and of how many recordings that is; see `Conditioned`.
         tool, tool_jacobian: Where the tool is and how joints move it, (R, 3) and (R, n, 3); see `RigidBody`.
     """
 
@@ -48,6 +49,8 @@ class Stretch:
     qdd: np.ndarray
     tool: np.ndarray
     tool_jacobian: np.ndarray
+    motion: int = -1
+    repeats: int = 1
 
     def of_rigid_body(self, columns: np.ndarray) -> "Stretch":
         """With nothing but these columns, all of inertials, as they are without any explanation."""
@@ -97,5 +100,6 @@ def stretch(
     return Stretch(
         index, recording.t[kept], recording.began, X, y, Y is upright, rigid, tau, nominal, recording.unsure[kept],
         recording.usable[kept], recording.q[kept], recording.qd[kept], recording.qdd[kept],
-        np.asarray(along.rigid.tool)[kept], np.asarray(along.rigid.tool_jacobian)[kept],
+        np.asarray(along.rigid.tool)[kept], np.asarray(along.rigid.tool_jacobian)[kept], recording.motion,
+        recording.repeats,
     )  # fmt: skip

@@ -14,15 +14,20 @@ NO_BETTER = np.log(100.0)  # log odds that refitted inertials need over the nomi
 NOTABLE_SHIFT = 3.0  # standard deviations by which a link's inertials must move to be worth a sentence
 
 
-def verdict(ex: Explanation, proof: HeldOut, found: list[dict[str, Any]], rest: list[Unexplained]) -> str:
+def verdict(
+    ex: Explanation, proof: HeldOut, found: list[dict[str, Any]], rest: list[Unexplained], open_: dict[int, str]
+) -> str:
     """The contract's verdict.
 
-    `unexplained` where nothing is named, or where more is left unnamed than was named.
+    `unexplained` where nothing is named, or where more is left unnamed than was named.  `undecided` where nothing is
+    named and a joint can't be told of, or where that is so of most joints, whatever is named.
     """
     nominal, corrected = (proof.rmse(x) for x in (proof.nominal, proof.corrected))
     named = np.sqrt(np.clip(nominal**2 - corrected**2, 0.0, None))
     if any(not found or u.rms > named[u.joint] for u in rest):
         return "unexplained"
+    if open_ and (not found or 2 * len(open_) > proof.judged.sum()):
+        return "undecided"
     if found:
         return "physics_left_out"
     return "parameters_only" if _inertials_matter(ex) else "no_mismatch"
@@ -90,19 +95,25 @@ def unexplained_entry(robot: Robot, u: Unexplained) -> dict[str, Any]:
 
 def summary(
     kind: str, found: list[dict[str, Any]], rest: list[Unexplained], fit: dict[str, Any],
-    inertials: list[dict[str, Any]], robot: Robot, sources: list[str],
+    inertials: list[dict[str, Any]], robot: Robot, sources: list[str], missing: list[str],
 ) -> str:  # fmt: skip
-    """A short paragraph for a person."""
+    """A short paragraph for a person; `missing` are sentences on what is too little to decide by."""
     what = f"{len(sources)} recording{'s' if len(sources) != 1 else ''} of {robot.n} joint{'s' if robot.n != 1 else ''}"
     parts = {
-        "no_mismatch": f"The model explains {what} to the noise; nothing is left out that this motion could show.",
+        "no_mismatch": (
+            f"The model explains {what} to what the sensors scatter by; nothing is left out that this motion could "
+            "show."
+        ),
         "parameters_only": (
-            f"Nothing is left out that {what} could show: refitted inertial parameters explain the torque to the noise."
+            f"Nothing is left out that {what} could show: refitted inertial parameters explain the torque."
         ),
         "physics_left_out": f"The model leaves physics out of {what}.",
+        "undecided": f"{what[0].upper()}{what[1:]} can't tell whether the model leaves anything out.",
         "unexplained": f"The model leaves out structure in {what} that no effect of the library explains.",
     }
     said = [parts[kind]]
+    if kind == "undecided":
+        said += [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing]
     by_effect: dict[str, list[str]] = {}
     for f in found:
         by_effect.setdefault(f["effect"], []).append(
@@ -125,7 +136,8 @@ def summary(
     unit = "N" if robot.is_slide[robot.joint_names.index(worst)] else "N m"
     said.append(
         f"On unseen data the error of {worst} goes from {f['rmse_nominal']:.3g} {unit} (model as given) over "
-        f"{f['rmse_refit']:.3g} (inertials refitted) to {f['rmse_corrected']:.3g}; the noise is {f['noise_floor']:.3g}."
+        f"{f['rmse_refit']:.3g} (inertials refitted) to {f['rmse_corrected']:.3g}; the sensors scatter by "
+        f"{f['noise_floor']:.3g}."
     )
     return " ".join(said)
 

@@ -43,6 +43,9 @@ class Conditioned:
         unsure: Standard deviation of the low-passed torque that the samples leave open, shape (T, n): see `_between`.
         notes: Repairs, as sentences.
         began: Time of the log's first row [s]; the smoother leaves out the first samples.
+        motion: Number of the motion, the same for recordings of one programme; -1: its own.
+        repeats: How many recordings there are of that motion.
+        shaken: Standard deviation of what encoder noise leaves in qdd [rad/s^2 or m/s^2], shape (n,).
     """
 
     source: str
@@ -58,6 +61,9 @@ class Conditioned:
     unsure: np.ndarray
     notes: tuple[str, ...]
     began: float = 0.0
+    shaken: np.ndarray | None = None
+    motion: int = -1
+    repeats: int = 1
 
 
 def choose_band(recordings: list[Recording], robot: Robot) -> Band:
@@ -172,7 +178,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     unsure = _between(tau, band, raw_rate)
     anti_alias = kernels(min(0.4 * band.rate, 0.45 * raw_rate), raw_rate)[0]
     white = white_density(recording, raw_rate)
-    q, speed_noise = without_noise(q, white, raw_rate, h1, resampled=t is not recording.t)
+    q, (speed_noise, shaken) = without_noise(q, white, raw_rate, (h1, h2), resampled=t is not recording.t)
     smoothed = [convolved(q, k) for k in (h, h1, h2)]
     tau = filtered(tau, anti_alias)
     keep = slice(None) if pad else slice(half, len(t) - half)
@@ -193,7 +199,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     usable, began = ~resting & ~lost[:, None] & ~frozen, float(recording.t[0])
     moving = (recording.source, grid, q, qd, qdd, tau, usable)
     q_noise = np.sqrt(0.5 * raw_rate * white)
-    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began)
+    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken)
 
 
 def _lost_torque(recording: Recording, grid: np.ndarray, reach: int) -> np.ndarray:

@@ -11,7 +11,7 @@ import tempfile
 import numpy as np
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings import guess
+from irb140_jax.recordings import guess, repair
 from irb140_jax.recordings.channel_health import TOLD, health, torque_scales
 from irb140_jax.recordings.check import RATES
 from irb140_jax.recordings.column_file import read_column_map
@@ -87,6 +87,11 @@ class Inspection:
     doubts: tuple[str, ...]
     map: str
     refusal: str
+
+    @property
+    def names(self) -> set[str]:
+        """Contract names of the channels that were found."""
+        return {channel.name for channel in self.channels}
 
 
 def inspect_recording(
@@ -169,7 +174,10 @@ def _seconds(
     since = seconds_since_start(values, [])
     if since is not values:
         return since, "s", []
-    step = float(np.median(np.diff(values[np.isfinite(values)]))) if np.isfinite(values).sum() > 2 else 0.0
+    good = values[np.isfinite(values)]
+    step = float(np.median(np.diff(good))) if len(good) > 2 else 0.0
+    if step == 0.0 and len(good) > 2:  # a coarse clock: several rows a tick
+        step = float(good[-1] - good[0]) / (len(good) - 1)
     stated = table.units.get(time)
     if stated in SHORT:
         return values * UNITS[stated], stated, []
@@ -179,7 +187,8 @@ def _seconds(
     # Where several fit, the rate nearest to 250 a second: robots log between 20 and 5000.
     best = min(fits, key=lambda short: abs(np.log(step * TIME_FACTORS[SHORT[short]] * 250)))
     best = "s" if "s" in fits and 10 <= 1 / step <= 5000 else best
-    return values * TIME_FACTORS[SHORT[best]], best, []
+    t = values * TIME_FACTORS[SHORT[best]]
+    return repair.with_coarse_times_spread({"t": t}, [])["t"], best, []
 
 
 def _channel(

@@ -19,7 +19,7 @@ CHANCE = 1e-6  # with which noise alone is as high as the top of a run of freque
 
 
 def without_noise(
-    q: np.ndarray, white: np.ndarray, rate: float, h1: np.ndarray, *, resampled: bool
+    q: np.ndarray, white: np.ndarray, rate: float, differentiators: tuple[np.ndarray, np.ndarray], *, resampled: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Wiener's smoother: every frequency of every joint's position weighted by the share of it that is signal.
 
@@ -31,27 +31,29 @@ def without_noise(
         q: Positions on an even grid, shape (T, n).
         white: Power density of their white noise [rad^2/Hz or m^2/Hz], shape (n,).
         rate: Samples per second.
-        h1: Taps of the differentiator that follows.
+        differentiators: Taps of those that follow, to the first and the second derivative.
         resampled: Whether the spectrum's top no longer shows the noise.
 
     Returns:
         Positions, with as many beyond either end as the differentiator reaches, shape (T + len(h1) - 1, n); and the
-        standard deviation of the noise in their speeds, shape (n,).
+        standard deviation of the noise in their speeds and accelerations, shape (2, n).
 
     Source: N. Wiener, Extrapolation, Interpolation and Smoothing of Stationary Time Series, 1949.
     """
-    half = (len(h1) - 1) // 2
+    half = (len(differentiators[0]) - 1) // 2
     reach = max(min(len(q) - 1, int(BEYOND * rate)), half)
-    out, noise = np.empty((len(q) + 2 * half, q.shape[1])), np.zeros(q.shape[1])
+    out, noise = np.empty((len(q) + 2 * half, q.shape[1])), np.zeros((2, q.shape[1]))
     f = np.fft.rfftfreq(len(q) + 2 * reach, 1.0 / rate)
     for j in range(q.shape[1]):
         share, floor, at = signal_share(q[:, j], white[j] if resampled else 0.0, rate)
         longer = _goes_on(q[:, j], rate, reach, np.interp(f, at, share))
         out[:, j] = longer[reach - half : reach + len(q) + half]
-        response = np.abs(np.fft.rfft(h1, 8192)) * np.interp(np.fft.rfftfreq(8192, 1.0 / rate), at, share)
+        weight = np.interp(np.fft.rfftfreq(8192, 1.0 / rate), at, share)
         # Jerks fill the top of the spectrum, but few samples.
         floor = min(floor, white[j])
-        noise[j] = np.sqrt(floor * np.sum(response**2) * rate / 8192)
+        for k, taps in enumerate(differentiators):
+            response = np.abs(np.fft.rfft(taps, 8192)) * weight
+            noise[k, j] = np.sqrt(floor * np.sum(response**2) * rate / 8192)
     return out, noise
 
 

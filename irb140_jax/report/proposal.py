@@ -23,8 +23,8 @@ def proposal_sentences(robot: Robot, open_: Undecided, proposal: Proposal) -> li
     """
     pieces = _listed([p.said(robot.joint_names) for p in proposal.pieces])
     lines = [f"{proposal.motion.t[-1]:.0f} s from rest to rest: {pieces}."]
-    for pair, now, odds in zip(open_.pairs, proposal.odds_now, proposal.odds, strict=True):
-        lines.append(_pair(robot, pair, now, odds))
+    for k, pair in enumerate(open_.pairs):
+        lines.append(_pair(robot, pair, proposal, k))
     lines += _hidden(robot, open_, proposal)
     if not open_.pairs and not open_.hidden:
         lines.append("The diagnosis left nothing open: along this motion every effect would show.")
@@ -36,17 +36,30 @@ def proposal_sentences(robot: Robot, open_: Undecided, proposal: Proposal) -> li
     return lines
 
 
-def _pair(robot: Robot, pair: Pair, now: float, odds: float) -> str:
+def _pair(robot: Robot, pair: Pair, proposal: Proposal, k: int) -> str:
     where = _listed([robot.joint_names[j] for j in pair.joints])
     one, other = CATALOGUE[pair.named], CATALOGUE[pair.rival]
-    either = f"On {where}, {one.title} or {other.title}"
+    either, now, odds = f"On {where}, {one.title} or {other.title}", proposal.odds_now[k], proposal.odds[k]
     if odds > SEPARATED:
         return (
             f"{either}: log odds of {odds:.3g} at least are to be expected for the true one, against {now:.3g} by the "
             "recordings alone."
         )
     motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
-    return f"{either}: no motion that was tried separates them{f'; what may is {motion}' if motion else ''}."
+    better = f"; what may is {motion}" if motion else ""
+    return f"{either}: no motion that was tried separates them: {_why(proposal, k)}{better}."
+
+
+def _why(proposal: Proposal, k: int) -> str:
+    """Why a motion does not separate two explanations."""
+    if proposal.exact[k] > SEPARATED:
+        return (
+            f"their torques differ along it (log odds of {proposal.exact[k]:.3g}, if both laws held exactly), but by "
+            "less than a real joint departs from either law"
+        )
+    played = f"along all {proposal.tried - proposal.too_strong} pieces of motion, of every kind within the limits"
+    many = f" ({proposal.too_strong} more need more torque than the motors give)" if proposal.too_strong else ""
+    return f"{played}{many}, one can explain what the other predicts"
 
 
 def _hidden(robot: Robot, open_: Undecided, proposal: Proposal) -> Iterator[str]:
