@@ -125,10 +125,7 @@ def recorded_joints(
     Raises:
         RecordingError: The file or the map can't be read.
     """
-    column_map = ColumnMap() if columns is None else read_column_map(columns, known_joint_names)
-    file = read_table(pathlib.Path(path), known_joint_names, column_map.options)
-    table = renamed(file.columns, column_map)
-    _stated(table, file.units, column_map)
+    table, column_map = named_columns(path, columns, known_joint_names)
     moved = [joint for joint in known_joint_names if f"q.{joint}" in table]
     driven = [joint for joint in moved if f"tau.{joint}" in table]
     found = tuple(driven or moved)
@@ -137,6 +134,17 @@ def recorded_joints(
                              f"{', '.join(found)} of {', '.join(known_joint_names)}: say whose numbers they are with "
                              "joints = [\"...\", ...] in the map")
     return found
+
+
+def named_columns(
+    path: str | pathlib.Path, columns: str | pathlib.Path | None, known_joint_names: tuple[str, ...]
+) -> tuple[dict[str, np.ndarray], ColumnMap]:
+    """The columns of a file under the contract's names, as they are in the file otherwise, and the map used."""
+    column_map = ColumnMap() if columns is None else read_column_map(columns, known_joint_names)
+    file = read_table(pathlib.Path(path), known_joint_names, column_map.options)
+    table = renamed(file.columns, column_map)
+    _stated(table, file.units, column_map)
+    return table, column_map
 
 
 def _stated(table: dict[str, np.ndarray], units: dict[str, str], column_map: ColumnMap) -> dict[str, str]:
