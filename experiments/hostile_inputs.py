@@ -248,7 +248,7 @@ class Arm:
 
         for value in ("nan", "inf", "-inf", "-0.1", "0", "5", "1e300", "much", "", "0x5", "9" * 400):
             yield case(f"--inertial-uncertainty {value[:9]}", "--inertial-uncertainty", value)
-        for option in ("--frobnicate", "--out", "--robot", "--columns", "-x", "--"):
+        for option in ("--frobnicate", "--out", "--robot", "--columns", "-x", "---"):
             yield case(f"{option} at the end", option)
         for name, text in {
             "no TOML": "[[[", "empty quantity": '[columns]\n"" = ""\n', "a list": "columns = [1]\n",
