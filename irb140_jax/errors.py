@@ -9,7 +9,7 @@ class InputError(ValueError):
 
 
 class RobotError(InputError):
-    """The robot model can't be represented as a serial chain of hinges and slides."""
+    """The robot model can't be represented as hinges and slides on a fixed base."""
 
 
 class RecordingError(InputError):

@@ -1,11 +1,8 @@
-"""Loggers: rates, clocks, resolution, noise and filters between the arm and the file."""
+"""Loggers: rates, clocks, resolution and noise between the controller's channels and the file."""
 
 import dataclasses
 
 import numpy as np
-
-from testbed import drives
-from testbed.motions import STEP
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,7 +16,6 @@ class Logger:
         counts: Resolution of the positions, shape (n,) [rad or m].
         noise: Standard deviation of the torque sensors, shape (n,) [N m or N].
         steps: Resolution of the torques, shape (n,) [N m or N].
-        cut: Of the drive's filter on the logged torque [Hz], or None.
         speed: Whether qd is logged, too.
     """
 
@@ -29,7 +25,6 @@ class Logger:
     counts: np.ndarray
     noise: np.ndarray
     steps: np.ndarray
-    cut: float | None = None
     speed: bool = False
 
     @property
@@ -61,7 +56,6 @@ def logged(
         rng: Random numbers.
         t, q, qd, tau: Every STEP, as the channels of the controller have them; shapes (T,) and (T, n).
     """
-    tau = tau if logger.cut is None else drives.filtered(tau, STEP, logger.cut)
     due = np.arange(t[0] + 1.0 / logger.rate, t[-1] - 1.0 / logger.rate, 1.0 / logger.rate)
     due = due + rng.uniform(0.0, 1.0 / logger.rate)  # no clock starts with another's
     taken = due + np.clip(logger.jitter * rng.normal(size=len(due)), -0.3, 0.3) / logger.rate

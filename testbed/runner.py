@@ -3,6 +3,7 @@
     python -m testbed.runner work                       # cases 0 to 99 of *work*
     python -m testbed.runner check --count 300          # ... of *check*: every run of it is a look that counts
     python -m testbed.runner final --commit HASH
+    python -m testbed.runner work --label new --call irb140_jax.another:diagnose
 
 One JSON line a case is appended to results/testbed_DRAW.jsonl as it is done, so an interrupted run goes on where it
 stopped; `--label` names the file of another engine, or of other conditions (--noise 0.1 --longer 10, --error 0.3).  A
@@ -11,10 +12,13 @@ the recordings are written, read, checked and diagnosed.
 """
 
 import dataclasses
+import importlib
 import json
 import pathlib
+import re
 import tempfile
 import time
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -41,6 +45,8 @@ class Config:
     noise: float = 1.0
     longer: float = 1.0
     error: float | None = None
+    call: str = "irb140_jax.mismatch:diagnose"
+    """What diagnoses: module:function of a robot and recordings, with a `Result`."""
     engine: str = ""
     """Commit of the package that diagnoses, kept with each result."""
     out: pathlib.Path = RESULTS
@@ -48,8 +54,12 @@ class Config:
     """Begin no case after this time of day, HH:MM."""
 
 
-def judged(case: Case) -> dict[str, Any]:
+def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, Any]:
     """What the package says of a case, the truth, and what both are compared by.
+
+    Args:
+        case: The case.
+        diagnose: What diagnoses in place of the package's own function.
 
     Returns:
         draw, index, kinds, truth: Of the case.
@@ -61,8 +71,8 @@ def judged(case: Case) -> dict[str, Any]:
         impossible: Links whose exported inertials no body has, by model.
     """
     # Here, so that cases can be made where the package is not installed.
+    from irb140_jax import mismatch
     from irb140_jax.errors import InputError
-    from irb140_jax.mismatch import diagnose, predict
 
     out: dict[str, Any] = {"draw": case.draw, "index": case.index, "kinds": case.hidden, "truth": case.truth,
                            "diagnosis": None}  # fmt: skip
@@ -70,13 +80,13 @@ def judged(case: Case) -> dict[str, Any]:
     try:
         with tempfile.TemporaryDirectory() as folder:
             robot, recordings, unseen = _read(case, pathlib.Path(folder))
-        result = diagnose(robot, recordings)
+        result = (diagnose or mismatch.diagnose)(robot, recordings)
         out["seconds"] = time.perf_counter() - began
         out["diagnosis"] = {k: result.diagnosis[k] for k in KEPT if k in result.diagnosis}
         out["sentences"] = [x["sentence"] for x in result.views.get("inertials", []) if x["sentence"]]
-        out |= _compared(case, result, [predict(result.model, r) for r in unseen])
+        out |= _compared(case, result, [mismatch.predict(result.model, r) for r in unseen])
     except InputError as error:
-        out["refused"] = str(error)
+        out["refused"] = re.sub(r"\S*/(?=\w+\.\w+)", "", str(error))  # file names, without this machine's folders
     except Exception as error:  # a crash is a result, too
         out["failed"] = f"{type(error).__name__}: {error}"
     return out
@@ -161,6 +171,8 @@ def main() -> None:
 
     set_up_compilation_cache()
     config.out.mkdir(parents=True, exist_ok=True)
+    module, _, function = config.call.partition(":")
+    diagnose = getattr(importlib.import_module(module), function)
     path = stored(config.draw, config.label, config.out)
     done = {r["index"] for r in read(path)}
     for index in range(config.count):
@@ -169,7 +181,7 @@ def main() -> None:
         if index in done:
             continue
         vary = Variation(config.noise, config.longer, config.error)
-        out = {**judged(make(config.draw, index, config.commit, vary)), "engine": config.engine}
+        out = {**judged(make(config.draw, index, config.commit, vary), diagnose), "engine": config.engine}
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(compact(out)) + "\n")
         said = out["diagnosis"]["verdict"] if out["diagnosis"] else out.get("refused") or out["failed"]

@@ -1,5 +1,6 @@
 """The corrected model taken away: in JAX what `predict` gives, and in MuJoCo as much of it as MJCF can hold."""
 
+import dataclasses
 import functools
 
 import equinox as eqx
@@ -18,7 +19,8 @@ from irb140_jax.errors import InputError
 from irb140_jax.mismatch import corrected_robot, predict, prediction_times
 from irb140_jax.mismatch.consistent import consistent, pseudo_inertia
 from irb140_jax.mismatch.model import CorrectedModel, Named, from_json, to_json, torques_along
-from irb140_jax.mismatch.native import NOTES, XML, native_robot, save_native
+from irb140_jax.mismatch.native import NOTES, XML, native_gap, native_robot, save_native
+from irb140_jax.mismatch.notes import gap_notes
 from irb140_jax.recordings import Recording, read_recording
 from irb140_jax.recordings.conceal import random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec, rigid_torque
@@ -242,6 +244,26 @@ def test_impossible_inertials_become_those_of_a_body_that_mujoco_accepts(seed):
     mended = consistent(wild, phi)
     assert min(np.linalg.eigvalsh(pseudo_inertia(p)).min() for p in mended) > 0.0
     mujoco.MjModel.from_xml_string(robot_mjcf(irb.robot.with_phi(arm(), jnp.asarray(mended))))
+
+
+def test_how_far_the_written_file_is_off_is_what_impossible_inertials_lose():
+    m, sound = motion(), model("coulomb_friction", "viscous_friction")
+    smooth = as_conditioned(m)
+    along = lambda x: [x.band.apply(torques_along(x, smooth).corrected)]  # noqa: E731
+    gap = native_gap(sound, [smooth], along(sound))
+    size = np.sqrt(np.mean(along(sound)[0] ** 2, axis=0))
+    assert gap is not None and np.all(gap < 1e-6 * size)
+    wild = sound.phi_corrected * np.array([[1.0], [-1.0]])
+    lost = dataclasses.replace(sound, phi_corrected=wild)
+    mended = consistent(wild, np.asarray(arm().phi)) - wild
+    Y = np.asarray(irb.dynamics.regressor_batch(arm(), *(jnp.asarray(x) for x in (m.q, m.qd, m.qdd))))
+    expected = np.sqrt(np.mean(lost.band.apply(Y @ mended.ravel()) ** 2, axis=0))
+    gap = native_gap(lost, [smooth], along(lost))
+    assert gap is not None
+    np.testing.assert_allclose(gap, expected, rtol=1e-3)
+    (note, *_) = gap_notes(arm(), gap, size, [])
+    assert "are those of no body" in note and f"{gap[0]:.3g} N m" in note
+    assert not gap_notes(arm(), 0.001 * size, size, [])
 
 
 def test_the_model_survives_its_way_through_json():

@@ -119,11 +119,36 @@ def test_commanded_positions_are_mapped_with_their_unit(sound, tmp_path):
     np.testing.assert_allclose(again.extras["qdes.elbow"], sound.q[:, 1], atol=1e-9)
 
 
+def test_lines_of_joints_that_are_held_are_left_aside(sound, tmp_path):
+    table = columns(sound, "pos {n}", "eff {n}")
+    del table["eff 1"]
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    (tmp_path / "map.toml").write_text('[columns]\n"q.*" = "pos {n}"\n"tau.*" = "eff {n}"\n[sign]\nshoulder = -1')
+    again = unchecked_recording(tmp_path / "log.csv", JOINTS[1:], tmp_path / "map.toml", known_joints=JOINTS)
+    np.testing.assert_allclose(again.q, sound.q[:, 1:], rtol=1e-12)
+
+
+def test_numbers_of_joints_in_the_middle_need_a_list(sound, tmp_path):
+    table = columns(sound, "pos {n}", "eff {n}")
+    del table["eff 1"]
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    lines = '[columns]\n"q.*" = "pos {n}"\n"tau.*" = "eff {n}"'
+    (tmp_path / "map.toml").write_text(lines)
+    with pytest.raises(RecordingError, match="say whose numbers they are"):
+        recorded_joints(tmp_path / "log.csv", tmp_path / "map.toml", JOINTS)
+    (tmp_path / "map.toml").write_text('joints = ["shoulder", "elbow", "wrist"]\n' + lines)
+    assert recorded_joints(tmp_path / "log.csv", tmp_path / "map.toml", JOINTS) == ("elbow", "wrist")
+    # The same numbers hold where only these two are known.
+    again = unchecked_recording(tmp_path / "log.csv", JOINTS[1:], tmp_path / "map.toml")
+    np.testing.assert_allclose(again.q, sound.q[:, 1:], rtol=1e-12)
+
+
 def test_a_star_that_finds_some_joints_leaves_the_others(sound, tmp_path):
     table = columns(sound, "pos {n}", "eff {n}")
     del table["pos 2"], table["eff 2"]
     pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
-    (tmp_path / "map.toml").write_text('[columns]\n"q.*" = "pos {n}"\n"tau.*" = "eff {n}"')
+    lines = '[columns]\n"q.*" = "pos {n}"\n"tau.*" = "eff {n}"'
+    (tmp_path / "map.toml").write_text('joints = ["shoulder", "elbow", "wrist"]\n' + lines)
     assert recorded_joints(tmp_path / "log.csv", tmp_path / "map.toml", JOINTS) == ("shoulder", "wrist")
 
 

@@ -112,6 +112,13 @@ def test_separators_and_decimal_marks_are_found(frame, sound, tmp_path, separato
     assert_same(read(tmp_path, text(frame, sep=separator, decimal=decimal)), sound)
 
 
+def test_decimal_commas_that_come_late_are_seen(frame, sound, tmp_path):
+    table = text(frame, sep=";", decimal=",").split("\n")
+    table[1] = ";".join(["0"] * len(frame.columns))
+    again = read(tmp_path, "\n".join(table))
+    np.testing.assert_allclose(again.q[1:], sound.q[1:], rtol=1e-12)
+
+
 def test_a_separator_named_in_the_map_is_used(frame, sound, tmp_path):
     again = read(tmp_path, text(frame, sep="!", decimal=","), lines='separator = "!"\ndecimal = ","')
     assert_same(again, sound)

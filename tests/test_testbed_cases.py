@@ -1,9 +1,12 @@
 """Cases of the testbed: the same for the same seed, of every kind, and true to what they state."""
 
+import functools
+
 import numpy as np
 import pytest
 
 from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.errors import InputError
 from testbed import cases, probes, rubbing, runner, seeds
 from testbed.arms import built, random_arm
 from testbed.loggers import random_logger
@@ -50,9 +53,15 @@ def small_case(kind, seed=0, ordinary=True):
     return cases.assembled("work", 0, (kind or "nothing",), plant, sizes, motions, motions[:1], logger, rng, {})
 
 
+@functools.cache
+def bare_case():
+    """The same arm with nothing but ordinary friction."""
+    return small_case(None)
+
+
 @pytest.mark.parametrize("kind", list(cases.KINDS))
 def test_every_kind_changes_the_log_and_states_its_truth_in_the_contracts_words(kind):
-    case, bare = small_case(kind), small_case(None)
+    case, bare = small_case(kind), bare_case()
     special = [h for h in case.truth["hidden"] if h["role"] != "ordinary"]
     assert special and all(np.all(np.isfinite(r[k])) for r in case.recordings for k in r)
     changed = any(
@@ -83,6 +92,21 @@ def test_friction_on_a_joint_whose_torque_is_scaled_states_no_level():
     for h in hidden:
         if h["role"] == "ordinary":
             assert bool(h["parameters"]) == (h["joints"][0] not in scaled)
+
+
+def test_a_case_reaches_the_diagnosis_as_a_users_files_do_and_what_goes_wrong_is_a_result():
+    case, seen = small_case(None), []
+
+    def refuse(robot, recordings):
+        seen.append((robot, recordings))
+        raise InputError("too short")
+
+    assert runner.judged(case, refuse)["refused"] == "too short"
+    assert runner.judged(case, lambda robot, recordings: [][0])["failed"].startswith("IndexError")
+    robot, recordings = seen[0]
+    assert robot.joint_names == case.joint_names
+    for read, made in zip(recordings, case.recordings, strict=True):
+        np.testing.assert_allclose(read.tau, made["tau"])
 
 
 def test_a_body_with_negative_mass_or_a_flat_inertia_is_impossible():

@@ -5,7 +5,7 @@ import sys
 
 from helpers_testbed import finding, hidden, line
 
-from testbed import diagram, report
+from testbed import compare, diagram, report
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "experiments"))
 import testbed_probes  # noqa: E402
@@ -40,3 +40,13 @@ def test_a_probe_is_a_row_of_true_beside_said():
     assert "false names: payload on a,b (0.7)" in row and "gains within 5 %: 1 of 1" in row
     assert "unexplained: b 40 %" in row and "impossible bodies" in row
     assert testbed_probes.row(two_cases()[1]) == "KeyError: x"
+
+
+def test_two_engines_are_compared_on_the_cases_that_both_diagnosed():
+    false, failed = two_cases()
+    clean = line([finding("torque_gain", "a", gain=(0.8, 0.01))], [hidden("torque_gain", "a", gain=0.8)])
+    left, right = compare.common([false, failed], [false | clean, failed | {"index": 5}])
+    assert [x["index"] for x in left] == [3] == [x["index"] for x in right]
+    assert compare.changes(left, right) == [
+        "3 torque_gain: false payload -> none; in the stated class 1 -> 1 of 1"
+    ]  # fmt: skip

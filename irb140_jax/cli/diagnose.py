@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
-from irb140_jax.cli.options import Columns, Out
+from irb140_jax.cli.options import Columns, Hold, Out
+from irb140_jax.cli.robots import held_positions, recorded_robot
 from irb140_jax.cli.shown import console, progress, tell_kept
 from irb140_jax.errors import InputError
 
@@ -36,11 +37,12 @@ class Diagnose:
     EXAMPLES: ClassVar = """\
 irb140 diagnose fast.csv slow.csv --out d                        the ABB IRB 140, in SI units
 irb140 diagnose log.parquet --robot arm.urdf --out d             your robot, as MJCF or URDF
+irb140 diagnose left.csv --robot two_arms.urdf --hold torso=0.2 --out d    one arm of two; the rest stood still
 irb140 diagnose log.csv --robot arm.xml --columns map.toml --out d     other names and units
 irb140 diagnose log.csv --out d --json > diagnosis.json          for a program"""
 
     recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
-    """Recordings (CSV, Parquet or NPZ), best of several motions."""
+    """Recordings (CSV, Parquet, NPZ, MAT, ROS bag, MCAP, LeRobot), best of several motions."""
 
     out: Out
     """Folder for diagnosis.json and report.html: new, empty, or a former diagnosis, which is replaced."""
@@ -53,6 +55,13 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
 
     columns: Columns = None
     """TOML file that maps other column names and units."""
+
+    hold: Hold = ()
+    """Joint that stood still and where [rad or m], any number of times; other joints without columns are
+    taken to be at the model's reference, mostly zero."""
+
+    fix_base: bool = False
+    """The base, which floats in the model, stood still."""
 
     json: bool = False
     """Print diagnosis.json, and what is meant for people to stderr."""
@@ -76,16 +85,18 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
 
     def _diagnosed(self) -> "Result":
         from irb140_jax.recordings import read_recording
-        from irb140_jax.robot import irb140, load_robot
 
-        robot = load_robot(self.robot) if self.robot else irb140()
+        hold = held_positions(self.hold)
+        robot = recorded_robot(self.robot, self.recordings, self.columns, hold, self.fix_base)
         recordings = [read_recording(path, robot, columns=self.columns) for path in self.recordings]
         return diagnosed(robot, recordings, self.inertial_uncertainty, self._words())
 
     def _words(self) -> tuple[str, ...]:
-        """Options that name files, as the diagnosis keeps them."""
+        """Options that name files or joints, as the diagnosis keeps them."""
         files = {"--robot": self.robot, "--columns": self.columns}
-        return tuple(word for option, path in files.items() if path for word in (option, path.name))
+        named = [word for option, path in files.items() if path for word in (option, path.name)]
+        held = [word for joint in self.hold for word in ("--hold", joint)]
+        return (*named, *held, *(["--fix-base"] if self.fix_base else []))
 
 
 def diagnosed(

@@ -59,8 +59,14 @@ irb140 inspect log.csv --robot arm.urdf --columns map.toml            the log as
         from irb140_jax.report.inspection import print_inspection
         from irb140_jax.robot import load_robot
 
-        robot = load_robot(self.robot) if self.robot else None
+        robot = load_robot(self.robot, fix_base=True) if self.robot else None
         looks = [inspect_recording(path, robot, self.columns) for path in self.recordings]
+        if self.robot and robot is not None:  # joints without channels are held, as in a diagnosis
+            for i, look in enumerate(looks):
+                joints = [name for name in robot.joint_names if {f"q.{name}", f"tau.{name}"} <= look.names]
+                if 0 < len(joints) < robot.n:
+                    chosen = load_robot(self.robot, joints, fix_base=True)
+                    looks[i] = inspect_recording(self.recordings[i], chosen, self.columns)
         for look in looks:
             print_inspection(look, console())
         return looks

@@ -3,9 +3,10 @@
 import pathlib
 from typing import Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import Positional, UseAppendAction, arg
 
 Out = Annotated[pathlib.Path, arg(metavar="DIR")]
 OutFile = Annotated[pathlib.Path, arg(metavar="FILE.csv")]
 Folder = Annotated[Positional[pathlib.Path], arg(metavar="DIR")]
 Columns = Annotated[pathlib.Path | None, arg(metavar="FILE.toml")]
+Hold = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=VALUE")]

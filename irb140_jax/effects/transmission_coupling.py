@@ -5,6 +5,7 @@ import numpy as np
 
 from irb140_jax.effects.base import AbstractEffect, Parameter
 from irb140_jax.effects.motion import of_site
+from irb140_jax.robot.tree import path
 
 
 class TransmissionCoupling(AbstractEffect):
@@ -25,9 +26,11 @@ class TransmissionCoupling(AbstractEffect):
     )
 
     def sites(self, robot):
+        # Joints of different branches share no transmission.
         pairs = [
-            (i, j) for i in range(robot.n) for j in range(i + 1, robot.n) if robot.is_slide[i] == robot.is_slide[j]
+            (i, j) for j in range(robot.n) for i in path(robot.parent, j)[:-1] if robot.is_slide[i] == robot.is_slide[j]
         ]
+        pairs.sort()
         return np.array(pairs, dtype=int).reshape(-1, 2)
 
     def shapes(self, scales, joints):

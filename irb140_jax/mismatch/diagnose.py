@@ -12,12 +12,13 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
-from irb140_jax.mismatch.enough import sensor_scatter, undecidable
+from irb140_jax.mismatch.enough import sensor_scatter, torque_size, undecidable
 from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, explained_by, fitted, full_posterior
 from irb140_jax.mismatch.findings import findings, ranking
 from irb140_jax.mismatch.model import CorrectedModel, Named
-from irb140_jax.mismatch.notes import notes
+from irb140_jax.mismatch.native import native_gap
+from irb140_jax.mismatch.notes import gap_notes, notes
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, lasting, refitted, transferring
 from irb140_jax.mismatch.provenance import provenance
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
@@ -126,14 +127,19 @@ def _diagnosed(
         refit, proof, rest = _proved(ex, progress)
     found = findings(robot, ex)
     model = _model(robot, ex, refit, band)
+    w = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen).mean * ex.data.scale[ex.columns()]
+    logged = [s.tau for s in ex.data.stretches]
+    corrected = [s.tau - s.y + s.X[..., ex.columns()] @ w for s in ex.data.stretches]
+    lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
+    gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)
     seen = visibility(ex, matters)
     usable = np.sum([r.usable[band.kept(len(r.t))].sum(axis=0) for r in smooth], axis=0)
     said = notes(robot, smooth, band, config.inertial_uncertainty, usable, proof.judged)
     origin = provenance(robot, recordings, config.options, config.words)
     scatter = sensor_scatter(robot, recordings, smooth, band)
-    missing = undecidable(robot, proof, [s.tau for s in ex.data.stretches], scatter, band)
-    said = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()] + twice + again + said
+    missing = undecidable(robot, proof, logged, scatter, band)
+    said = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()] + twice + again + said + gap
     diagnosis = _document(robot, ex, proof, scatter, found, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said), open_)

@@ -1,14 +1,18 @@
 """The corrected model as MJCF, as far as MuJoCo expresses the physics natively, and what it can't."""
 
 import pathlib
+from collections.abc import Sequence
 
 import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.mismatch.consistent import consistent
 from irb140_jax.mismatch.model import CorrectedModel, Named, as_named
+from irb140_jax.oracle.mujoco import inverse_dynamics, oracle_model
+from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
 
+MOST = 4000  # samples of a recording along which the file is compared: 20 s at the working rate
 XML, NOTES = "corrected.xml", "corrected.md"
 
 
@@ -26,6 +30,35 @@ def save_native(model: CorrectedModel, folder: pathlib.Path) -> None:
     """Write the corrected model as MJCF, and a page on what it holds, into an existing folder."""
     (folder / XML).write_text(robot_mjcf(native_robot(model)), encoding="utf-8")
     (folder / NOTES).write_text(_page(model), encoding="utf-8")
+
+
+def native_gap(
+    model: CorrectedModel, smooth: Sequence[Conditioned], corrected: Sequence[np.ndarray]
+) -> np.ndarray | None:
+    """What `corrected.xml` gives other than the corrected model along the recordings, root mean square (n,) [N m or N].
+
+    By MuJoCo's own inverse dynamics of the text that is written, through the same low-pass.
+
+    Args:
+        model: The corrected model.
+        smooth: The conditioned recordings.
+        corrected: Its low-passed torque along each, (R, n).
+
+    Returns:
+        The difference; None where MuJoCo has other joints than the model.
+    """
+    native = oracle_model(robot_mjcf(native_robot(model)))
+    if native.nv != model.robot.n:
+        return None
+    gear = np.asarray(model.robot.gear) / native.actuator_gear[:, 0] if native.nu == native.nv else 1.0
+    square, rows = np.zeros(native.nv), 0
+    for r, torque in zip(smooth, corrected, strict=True):
+        moving = zip(r.q[:MOST], r.qd[:MOST], r.qdd[:MOST], strict=True)
+        own = np.array([inverse_dynamics(native, *x) for x in moving])
+        own = model.band.apply((own + native.dof_frictionloss * r.direction[:MOST]) * gear)
+        square += np.sum((own - torque[: len(own)]) ** 2, axis=0)
+        rows += len(own)
+    return np.sqrt(square / max(rows, 1))
 
 
 def _page(model: CorrectedModel) -> str:

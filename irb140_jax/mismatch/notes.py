@@ -8,6 +8,8 @@ from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
+NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
+
 
 def notes(
     robot: Robot, smooth: Sequence[Conditioned], band: Band, uncertainty: float, rows: np.ndarray, judged: np.ndarray
@@ -33,6 +35,27 @@ def notes(
         "differentiated. Figures leave out rows in which the joint rests: dry friction is undetermined there."
     )
     return list(dict.fromkeys(out))
+
+
+def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out: Sequence[str]) -> list[str]:
+    """A note for every joint at which `corrected.xml` gives another torque than the corrected model.
+
+    Args:
+        robot: The nominal model.
+        gap: The difference, shape (n,), or None where it isn't known.
+        torque: Size of the joints' torque, shape (n,).
+        left_out: Effects that MJCF can't hold, or not whole.
+    """
+    if gap is None:
+        return ["corrected.xml could not be compared with the corrected model: MuJoCo has other joints."]
+    reason = f"it lacks {', '.join(left_out)} in whole or in part" if left_out else (
+        "the inertials found are those of no body, and the file holds the nearest that are")
+    return [
+        f"corrected.xml gives a torque of {name} that is {g:.3g} {'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of "
+        f"its torque) off the corrected model: {reason}. Where that matters use `irb140 predict`."
+        for name, slide, g, t in zip(robot.joint_names, robot.is_slide, gap, torque, strict=True)
+        if g > NOTABLE_GAP * t > 0.0
+    ]
 
 
 def _sentence(note: str) -> str:

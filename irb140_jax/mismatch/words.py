@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.consistent import consistent
 from irb140_jax.mismatch.explanation import Explanation, fitted, full_posterior
 from irb140_jax.mismatch.prove import HeldOut
 from irb140_jax.mismatch.unknown import Unexplained
@@ -44,41 +45,63 @@ def _inertials_matter(ex: Explanation) -> bool:
 
 
 def inertial_views(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
-    """How far each link's inertials moved, in standard deviations of their stated uncertainty, with a sentence."""
+    """How far each link's inertials moved, in standard deviations of their stated uncertainty, with a sentence.
+
+    A torque does not show a link's mass but sums over links (base parameters); so a sentence says by what torque the
+    refitted inertials differ, and a mass is given only where the data know it, of a body that can be.
+    """
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
     dphi, _, _ = fitted(ex.data, post, ex.chosen, ex.factor)
-    phi = np.asarray(robot.phi) + dphi.reshape(-1, 10)
+    phi = np.asarray(robot.phi)
+    possible = consistent(phi + dphi.reshape(-1, 10), phi)
     loose = {ex.data.candidates[c].joints[0] for c in ex.chosen if ex.data.candidates[c].slug == "inertials"}
     uncertainty = ex.data.scale[0] if ex.data.nuisances else 0.05
+    known = _masses_known(ex, post.cov)
     out = []
     for k, name in enumerate(robot.joint_names):
-        factor = ex.factor[10 * k : 10 * k + 10, 10 * k : 10 * k + 10]
-        theta = np.linalg.lstsq(factor, dphi[10 * k : 10 * k + 10], rcond=1e-9)[0] / max(uncertainty, 1e-12)
+        own = slice(10 * k, 10 * k + 10)
+        theta = np.linalg.lstsq(ex.factor[own, own], dphi[own], rcond=1e-9)[0] / max(uncertainty, 1e-12)
         shift = float(np.max(np.abs(theta)))
-        before, after = float(robot.mass[k]), float(phi[k, 0])
         sentence = ""
         if k in loose:
             sentence = (
-                f"The inertials of the link behind {name} are wrong beyond their stated {100 * uncertainty:.3g} %: "
-                f"{_what_moved(np.asarray(robot.phi)[k], phi[k])}."
+                f"Inertials from the link behind {name} on are wrong beyond their stated {100 * uncertainty:.3g} %: "
+                f"refitted, they change the torque of {_what_moved(robot, ex, dphi, k)}."
             )
         elif shift > NOTABLE_SHIFT:
             sentence = f"The link behind {name} moved by {shift:.1f} standard deviations of the stated uncertainty."
         out.append({
-            "link": name, "shift_sigma": shift, "mass_nominal": before, "mass_refit": after, "sentence": sentence,
+            "link": name, "shift_sigma": shift, "mass_nominal": float(robot.mass[k]),
+            "mass_refit": float(possible[k, 0]) if known[k] and k not in loose else None, "sentence": sentence,
         })  # fmt: skip
     return out
 
 
-def _what_moved(before: np.ndarray, after: np.ndarray) -> str:
-    """The inertial parameters that changed most, in words."""
-    names = ("mass", "m cx", "m cy", "m cz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
-    units = ("kg", *("kg m",) * 3, *("kg m^2",) * 6)
-    groups = (slice(0, 1), slice(1, 4), slice(4, 10))
-    size = np.concatenate([np.full(g.stop - g.start, np.max(np.abs(before[g])) + 1e-12) for g in groups])
-    relative = np.abs(after - before) / size
-    worst = [i for i in np.argsort(-relative)[:3] if relative[i] > 0.02]
-    return ", ".join(f"{names[i]} {before[i]:.3g} -> {after[i]:.3g} {units[i]}" for i in worst) or "see the table"
+def _masses_known(ex: Explanation, cov: np.ndarray) -> np.ndarray:
+    """Links whose mass the data know twice as well as the model states it, shape (n,)."""
+    masses = ex.factor[::10]
+    prior = ex.data.scale[: ex.data.nuisances]
+    before, after = (
+        np.einsum("ki,ij,kj->k", masses * prior, c, masses * prior)
+        for c in (np.eye(ex.data.nuisances), cov[: ex.data.nuisances, : ex.data.nuisances])
+    )
+    return after < 0.25 * np.maximum(before, 1e-300)
+
+
+def _what_moved(robot: Robot, ex: Explanation, dphi: np.ndarray, k: int) -> str:
+    """By what torque the inertials changed from a link on, at the joints where that is most of the change."""
+    theta = np.linalg.lstsq(ex.factor, dphi, rcond=1e-9)[0]
+    theta[: 10 * k] = 0.0
+    change = [s.rigid @ theta for s in ex.data.stretches]
+    rows = np.maximum(sum(s.use.sum(axis=0) for s in ex.data.stretches), 1)
+    rms = np.sqrt(sum(np.sum(np.where(s.use, x, 0.0) ** 2, axis=0)
+                      for s, x in zip(ex.data.stretches, change, strict=True)) / rows)  # fmt: skip
+    said = []
+    for j in np.argsort(-rms)[:2]:
+        unit = "N" if robot.is_slide[j] else "N m"
+        if rms[j] > 0.1 * rms.max():
+            said.append(f"{robot.joint_names[j]} by {rms[j]:.3g} {unit} RMS")
+    return " and of ".join(said) or "no joint"
 
 
 def unexplained_entry(robot: Robot, u: Unexplained) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """The column map as a TOML file: read, spread over the joints, and every line of it checked."""
 
 import codecs
+import dataclasses
 import math
 import pathlib
 import re
@@ -26,14 +27,26 @@ SETTINGS = ("rate", "from", "to", "first_number", "joints", "encoding", "separat
             "time_format", "topic", "episode")  # fmt: skip
 
 
-def read_column_map(path: str | pathlib.Path, joint_names: Iterable[str]) -> ColumnMap:
+def read_column_map(
+    path: str | pathlib.Path, joint_names: Iterable[str], known: Iterable[str] | None = None
+) -> ColumnMap:
     """Read a column map for a robot with these joints.
+
+    Args:
+        path: The file.
+        joint_names: The joints that are read.
+        known: Every joint of the model, in its order, those that are held included: what the map says of them is left
+            aside, and {n} counts them.  By default those that are read, and those that the map lists.
 
     Raises:
         RecordingError: The file is missing, is not TOML, or names a section, quantity, joint or unit there is not.
     """
-    path, joints = pathlib.Path(path), tuple(joint_names)
+    path, read = pathlib.Path(path), tuple(joint_names)
     content = _content(path)
+    listed = content.get("joints")
+    # Without being told, whoever lists the joints knows which there are.
+    more = [name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
+    joints = tuple(dict.fromkeys([*read, *more])) if known is None else tuple(known)
     for key in content:
         if key not in (*SECTIONS, *SETTINGS, "columns", "coupling"):
             raise RecordingError(f"{path}: unknown section '{key}'{closest(key, [*SECTIONS, *SETTINGS])}; allowed are "
@@ -52,13 +65,29 @@ def read_column_map(path: str | pathlib.Path, joint_names: Iterable[str]) -> Col
     order = _joint_list(content.get("joints"), joints, f"{path}: joints") if "joints" in content else joints
     numbers = {joint: i + (1 if first is None else first) for i, joint in enumerate(order)}
     sections = {section: _lines(content, section, joints, path, _number(section)) for section in SECTIONS}
+    coupling = _coupling(content.get("coupling"), joints, path)
+    if coupling is not None and not set(coupling.joints) <= set(read):
+        coupling = None if not set(coupling.joints) & set(read) else coupling
+    held = set(joints) - set(read)
+    own = lambda lines: tuple(line for line in (_without(line, held) for line in lines) if line.values)  # noqa: E731
     return ColumnMap(
-        names=_names(content, joints, numbers, path),
-        numbers={section: lines for section, lines in sections.items() if lines},
-        coupling=_coupling(content.get("coupling"), joints, path), rate=rate,
+        names=own(_names(content, joints, numbers, path)),
+        numbers={section: own(lines) for section, lines in sections.items() if own(lines)},
+        coupling=coupling, numbered=_is_numbered(content), rate=rate,
         start=-np.inf if start is None else start, end=np.inf if end is None else end,
         options=_options(content, path), source=str(path),
     )  # fmt: skip
+
+
+def _without(line: Line, held: set[str]) -> Line:
+    """The line without what it says of joints that are held."""
+    kept = {channel: value for channel, value in line.values.items() if channel.partition(".")[2] not in held}
+    return dataclasses.replace(line, values=kept)
+
+
+def _is_numbered(content: dict[str, Any]) -> bool:
+    """Whether joints are found by their number in the robot's own order."""
+    return "joints" not in content and any("{n" in str(name) for name in dict(content.get("columns", {})).values())
 
 
 def _content(path: pathlib.Path) -> dict[str, Any]:

@@ -63,6 +63,7 @@ class ColumnMap:
         names: Lines of [columns]: contract name -> name in the file.
         numbers: Lines of the other sections, by the section's name.
         coupling: Or None.
+        numbered: Whether joints are found by their number in the robot's own order.
         rate: Sampling rate [Hz] of a file without time column, else None.
         start, end: What part of the recording is used, in seconds after its first row.
         options: How the file itself is read.
@@ -72,6 +73,7 @@ class ColumnMap:
     names: tuple[Line, ...] = ()
     numbers: Mapping[str, tuple[Line, ...]] = dataclasses.field(default_factory=dict)
     coupling: Coupling | None = None
+    numbered: bool = False
     rate: float | None = None
     start: float = -np.inf
     end: float = np.inf

@@ -6,12 +6,13 @@
 
 import dataclasses
 import pathlib
+import re
 import tempfile
 
 import numpy as np
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings import guess
+from irb140_jax.recordings import guess, repair
 from irb140_jax.recordings.channel_health import TOLD, health, torque_scales
 from irb140_jax.recordings.check import RATES
 from irb140_jax.recordings.column_file import read_column_map
@@ -29,6 +30,7 @@ from irb140_jax.recordings.torques import nominal_torques
 from irb140_jax.recordings.units import UNITS
 from irb140_jax.robot import Robot
 
+NUMBER = re.compile(r"\d+")
 ORDER = ("q", "qd", "qdd", "tau", "qdes")
 SHORT = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 
@@ -88,6 +90,11 @@ class Inspection:
     map: str
     refusal: str
 
+    @property
+    def names(self) -> set[str]:
+        """Contract names of the channels that were found."""
+        return {channel.name for channel in self.channels}
+
 
 def inspect_recording(
     path: str | pathlib.Path, robot: Robot | None = None, columns: str | pathlib.Path | None = None
@@ -115,7 +122,7 @@ def inspect_recording(
     likely, more = likely_units(t, {name: numbers[of[0].column] for name, of in meanings.items()},
                                 {name: of[0].unit for name, of in meanings.items()}, robot)  # fmt: skip
     seen = tuple(_channel(name, of, numbers, likely[name], t) for name, of in meanings.items())
-    doubts += more + _missing(meanings, joints)
+    doubts += more + _missing(meanings, joints) + _without_quantity(numbers, joints, meanings)
     draft = drafted_map(path.name, time, unit, {c.name: c for c in seen}, joints, given)
     refusal, read_notes = _tried(path, robot, columns, draft, meanings)
     used = {time, *(c.column for c in seen), *(other for c in seen for other in c.others)}
@@ -169,7 +176,10 @@ def _seconds(
     since = seconds_since_start(values, [])
     if since is not values:
         return since, "s", []
-    step = float(np.median(np.diff(values[np.isfinite(values)]))) if np.isfinite(values).sum() > 2 else 0.0
+    good = values[np.isfinite(values)]
+    step = float(np.median(np.diff(good))) if len(good) > 2 else 0.0
+    if step == 0.0 and len(good) > 2:  # a coarse clock: several rows a tick
+        step = float(good[-1] - good[0]) / (len(good) - 1)
     stated = table.units.get(time)
     if stated in SHORT:
         return values * UNITS[stated], stated, []
@@ -179,7 +189,8 @@ def _seconds(
     # Where several fit, the rate nearest to 250 a second: robots log between 20 and 5000.
     best = min(fits, key=lambda short: abs(np.log(step * TIME_FACTORS[SHORT[short]] * 250)))
     best = "s" if "s" in fits and 10 <= 1 / step <= 5000 else best
-    return values * TIME_FACTORS[SHORT[best]], best, []
+    t = values * TIME_FACTORS[SHORT[best]]
+    return repair.with_coarse_times_spread({"t": t}, [])["t"], best, []
 
 
 def _channel(
@@ -223,6 +234,15 @@ def _missing(meanings: dict, joints: tuple[str, ...]) -> list[str]:
     says = [f"No position is found for {', '.join(lost)}"] if lost else []
     no_torque = [name[2:] for name in meanings if name.startswith("q.") and f"tau.{name[2:]}" not in meanings]
     return says + ([f"No torque or current is found for {', '.join(no_torque)}"] if no_torque else [])
+
+
+def _without_quantity(numbers: dict[str, np.ndarray], joints: tuple[str, ...], meanings: dict) -> list[str]:
+    """Columns that name a joint and nothing else, as where each quantity has a file of its own."""
+    if any(name.startswith("q.") for name in meanings):
+        return []
+    bare = [name for name in numbers if name in joints or re.fullmatch(r"(?i)(joint|axis|j|a|motor)?[ _.]*\d+", name)]
+    return [f"Columns {', '.join(bare[:8])} name joints and no quantity: say in [columns] what they are, as in "
+            f"\"q.*\" = \"{NUMBER.sub('{n}', bare[0])}\""] if bare else []  # fmt: skip
 
 
 def _tried(

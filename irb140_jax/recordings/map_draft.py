@@ -32,7 +32,8 @@ def drafted_map(
     """
     first, names = _names(channels, joints)
     lines = [f"# Column map for {source}, guessed from names and numbers: check every line.  See docs/columns.md.", ""]
-    lines += _settings(given, first if any("{n}" in line for line in names) else 1)
+    numbered = any("{n" in line for line in names)
+    lines += _settings(given, first if numbered else 1, joints if numbered else ())
     if not time:
         lines += ["# No time column was found.", "# rate = 250.0               # samples a second", ""]
     lines += ["[columns]"]
@@ -53,13 +54,17 @@ def drafted_map(
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _settings(given: ColumnMap, first: int) -> list[str]:
+def _settings(given: ColumnMap, first: int, joints: Sequence[str]) -> list[str]:
     options = {name: value for name, value in dataclasses.asdict(given.options).items() if value is not None}
     if given.rate is not None:
         options["rate"] = given.rate
     if first != 1:
         options["first_number"] = first
-    lines = [f"{name} = {_quoted(value) if isinstance(value, str) else value}" for name, value in options.items()]
+    if joints:
+        options["joints"] = json.dumps(list(joints), ensure_ascii=False)
+    quoted = {name: value if name == "joints" else _quoted(value) if isinstance(value, str) else value
+              for name, value in options.items()}  # fmt: skip
+    lines = [f"{name} = {value}" for name, value in quoted.items()]
     return [*lines, ""] if lines else []
 
 
@@ -72,7 +77,7 @@ def _names(channels: Mapping[str, "Channel"], joints: Sequence[str]) -> tuple[in
             continue
         pattern, start = _pattern(own, joints)
         if pattern is not None:
-            first = start if "{n}" in pattern else first
+            first = start if "{n" in pattern else first
             lines.append(f"{_quoted(quantity + '.*')} = {_quoted(pattern)}")
         else:
             lines += [f"{_quoted(name)} = {_quoted(c.column)}" for name, c in own.items()]

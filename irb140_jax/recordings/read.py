@@ -24,7 +24,7 @@ from irb140_jax.robot import Robot
 
 def read_recording(
     path: str | pathlib.Path, robot: Robot, columns: str | pathlib.Path | None = None, *,
-    torque: Literal["required", "optional"] = "required",
+    torque: Literal["required", "optional"] = "required", known_joints: tuple[str, ...] | None = None,
 ) -> Recording:
     """Read a recording of this robot, in any format of `recordings.table`, and check it.
 
@@ -33,6 +33,8 @@ def read_recording(
         robot: The model of the robot that was recorded; gives the joints' names and what torque is plausible.
         columns: A TOML file that maps other names, units and sides, see `docs/columns.md`.
         torque: Whether columns tau.<joint> have to be there; a planned motion has none, and its `tau` is NaN.
+        known_joints: Every joint that the model has, in its order, where the robot is a part of it: the map may speak
+            of the others, too.
 
     Returns:
         The recording.  Repairs that are safe are made and stated in its `notes`.
@@ -42,7 +44,7 @@ def read_recording(
             wrong and what would mend it.
     """
     path = pathlib.Path(path)
-    recording = unchecked_recording(path, robot.joint_names, columns, torque=torque)
+    recording = unchecked_recording(path, robot.joint_names, columns, torque=torque, known_joints=known_joints)
     recording = repair.without_glitches(repair.unwrapped(recording, robot.is_slide))
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
@@ -53,10 +55,12 @@ def read_recording(
 
 def unchecked_recording(
     path: pathlib.Path, joint_names: tuple[str, ...], columns: str | pathlib.Path | None = None, *,
-    torque: Literal["required", "optional"] = "required",
+    torque: Literal["required", "optional"] = "required", known_joints: tuple[str, ...] | None = None,
 ) -> Recording:
     """The numbers of a file as a `Recording`: complete, finite, in rising time; motion and torque are not checked."""
-    column_map = ColumnMap(source=str(path)) if columns is None else read_column_map(columns, joint_names)
+    column_map = ColumnMap(source=str(path)) if columns is None else read_column_map(
+        columns, joint_names, known_joints
+    )
     file = read_table(path, joint_names, column_map.options)
     table, notes = renamed(file.columns, column_map), file.notes
     stated = _stated(table, file.units, column_map)
@@ -121,13 +125,26 @@ def recorded_joints(
     Raises:
         RecordingError: The file or the map can't be read.
     """
+    table, column_map = named_columns(path, columns, known_joint_names)
+    moved = [joint for joint in known_joint_names if f"q.{joint}" in table]
+    driven = [joint for joint in moved if f"tau.{joint}" in table]
+    found = tuple(driven or moved)
+    if column_map.numbered and found != known_joint_names[: len(found)]:
+        raise RecordingError(f"{column_map.source}: joints are found by their number {{n}}, and the recording holds "
+                             f"{', '.join(found)} of {', '.join(known_joint_names)}: say whose numbers they are with "
+                             "joints = [\"...\", ...] in the map")
+    return found
+
+
+def named_columns(
+    path: str | pathlib.Path, columns: str | pathlib.Path | None, known_joint_names: tuple[str, ...]
+) -> tuple[dict[str, np.ndarray], ColumnMap]:
+    """The columns of a file under the contract's names, as they are in the file otherwise, and the map used."""
     column_map = ColumnMap() if columns is None else read_column_map(columns, known_joint_names)
     file = read_table(pathlib.Path(path), known_joint_names, column_map.options)
     table = renamed(file.columns, column_map)
     _stated(table, file.units, column_map)
-    moved = [joint for joint in known_joint_names if f"q.{joint}" in table]
-    driven = [joint for joint in moved if f"tau.{joint}" in table]
-    return tuple(driven or moved)
+    return table, column_map
 
 
 def _stated(table: dict[str, np.ndarray], units: dict[str, str], column_map: ColumnMap) -> dict[str, str]:

@@ -1,6 +1,7 @@
 """The robot: a pytree, and the reader that makes one from MJCF or URDF."""
 
 from irb140_jax.robot.mjcf import load_robot as load_robot
+from irb140_jax.robot.mjcf import movable_joints as movable_joints
 from irb140_jax.robot.mjcf import robot_from_model as robot_from_model
 from irb140_jax.robot.robot import Robot as Robot
 from irb140_jax.robot.robot import about_origin as about_origin

@@ -1,7 +1,6 @@
 """Which of a model's joints make the robot, and where all others are held."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import NamedTuple
 
 import mujoco
@@ -9,12 +8,16 @@ import numpy as np
 
 from irb140_jax.errors import RobotError
 from irb140_jax.robot.couplings import Coupling, couplings
+from irb140_jax.robot.description import Description
 from irb140_jax.robot.tree import Parents, path
 
 MOST_JOINTS = 40
 
 SCALAR = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+
+
+ASKED = "it is to be held"
 
 
 class Choice(NamedTuple):
@@ -42,31 +45,27 @@ class Wish(NamedTuple):
         joints: Names of the joints to keep, or None for all that can be kept.
         hold: Positions of joints to hold, by name [rad or m].
         fix_base: Whether a floating base stands still.
-        floating: Names of bodies that float though the compiled model has them fixed, as URDF has it.
-        mimics: Followers that the compiled model knows nothing of: follower, leader, factor, offset.
     """
 
-    joints: Sequence[str] | None = None
-    hold: Mapping[str, float] = MappingProxyType({})
-    fix_base: bool = False
-    floating: frozenset[str] = frozenset()
-    mimics: tuple[tuple[str, str, float, float], ...] = ()
+    joints: Sequence[str] | None
+    hold: Mapping[str, float]
+    fix_base: bool
 
 
-def choose(model: mujoco.MjModel, wish: Wish, source: str) -> Choice:
+def choose(said: Description, wish: Wish) -> Choice:
     """The joints asked for, ordered into branches, the last one named on the last branch.
 
     Args:
-        model: Compiled model.
+        said: What the model's file says.
         wish: What is asked of it.
-        source: Where it came from, for messages.
 
     Raises:
         RobotError: A joint there is not or that can't be kept, a floating base that is not held, too few or too many.
     """
+    model, source = said.model, said.source
     names = [model.joint(j).name for j in range(model.njnt)]
     _refuse_unknown(model, names, wish, source)
-    coupled = couplings(model, wish.mimics)
+    coupled = couplings(model, said.mimics)
     left_out = dict(_left_out(model, names, wish, coupled))
     if wish.joints is None:
         joints = [j for j in range(model.njnt) if j not in left_out]
@@ -77,17 +76,24 @@ def choose(model: mujoco.MjModel, wish: Wish, source: str) -> Choice:
                 raise RobotError(f"{source}: joint '{names[j]}' can't be diagnosed: {left_out[j]}: hold it with --hold "
                                  f"{names[j]}=VALUE, or leave out its columns")
     _refuse_number(len(joints), model, left_out, wish, source)
-    _refuse_floating(model, joints, wish, source)
+    if not wish.fix_base:
+        _refuse_floating(said, joints)
     last = next((names.index(n) for n in reversed(wish.joints or ()) if names.index(n) in joints), None)
     joints, parent = _in_branches(model, joints, last)
     qpos = _held_pose(model, names, wish, joints, coupled)
     carrier = tuple(_carrier(model, body, joints) for body in range(model.nbody))
-    notes = (*_held_notes(model, names, joints, qpos, left_out), *_tool_note(names, joints, parent))
+    notes = (*_held_notes(model, joints, qpos, left_out), *_tree_notes(names, joints, parent))
     return Choice(tuple(joints), parent, qpos, carrier, notes)
 
 
+def scalar_joints(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Names of all hinges and slides, in the model's order."""
+    names = [model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) in SCALAR]
+    return tuple(name for name in names if name)
+
+
 def _refuse_unknown(model: mujoco.MjModel, names: list[str], wish: Wish, source: str) -> None:
-    movable = [name for j, name in enumerate(names) if name and int(model.jnt_type[j]) in SCALAR]
+    movable = scalar_joints(model)
     for name in (*(wish.joints or ()), *wish.hold):
         if name not in names:
             raise RobotError(f"{source}: the model has no joint '{name}'; its movable joints are {_listed(movable)}")
@@ -112,7 +118,7 @@ def _left_out(
         elif not name:
             yield j, "it has no name, and recordings are matched by name"
         elif name in wish.hold:
-            yield j, "it is to be held"
+            yield j, ASKED
 
 
 def _refuse_number(count: int, model: mujoco.MjModel, left_out: dict[int, str], wish: Wish, source: str) -> None:
@@ -126,16 +132,15 @@ def _refuse_number(count: int, model: mujoco.MjModel, left_out: dict[int, str], 
                          "arm, by the columns of the recording")
 
 
-def _refuse_floating(model: mujoco.MjModel, joints: list[int], wish: Wish, source: str) -> None:
-    if wish.fix_base:
-        return
+def _refuse_floating(said: Description, joints: list[int]) -> None:
+    model = said.model
     for j in joints:
         for body in _way(model, int(model.jnt_bodyid[j])):
             name, first = model.body(body).name, int(model.body_jntadr[body])
             is_free = model.body_jntnum[body] > 0 and int(model.jnt_type[first]) == FREE
-            if name in wish.floating or is_free:
-                raise RobotError(f"{source}: body '{name}' floats and carries joint '{model.joint(j).name}'; a base "
-                                 "that moves can't be diagnosed from joint torques: if it was held still, add "
+            if name in said.floating or is_free:
+                raise RobotError(f"{said.source}: body '{name}' floats and carries joint '{model.joint(j).name}'; a "
+                                 "base that moves can't be diagnosed from joint torques: if it was held still, add "
                                  "--fix-base")
 
 
@@ -202,16 +207,16 @@ def _held_pose(
 
 
 def _held_notes(
-    model: mujoco.MjModel, names: list[str], joints: list[int], qpos: np.ndarray, left_out: dict[int, str]
+    model: mujoco.MjModel, joints: list[int], qpos: np.ndarray, left_out: dict[int, str]
 ) -> Iterator[str]:
-    """What is held, in two sentences: for want of columns, and for another reason."""
+    """What is held: for want of columns or as asked, in one sentence, and for other reasons in another."""
     held = [j for j in range(model.njnt) if j not in joints and int(model.jnt_type[j]) in SCALAR]
-    plain = [j for j in held if j not in left_out or left_out[j] == "it is to be held"]
+    plain = [_position(model, j, qpos) for j in held if left_out.get(j, ASKED) == ASKED]
+    tied = [f"{_position(model, j, qpos)} ({left_out[j]})" for j in held if left_out.get(j, ASKED) != ASKED]
     if plain:
-        yield f"held still: {', '.join(_position(model, j, qpos) for j in plain)}"
-    for j in held:
-        if j not in plain:
-            yield f"held still: {_position(model, j, qpos)}, for {left_out[j]}"
+        yield f"held still: {', '.join(plain)}"
+    if tied:
+        yield f"held still, since no column can tell of them: {', '.join(tied)}"
     for j in range(model.njnt):
         if int(model.jnt_type[j]) not in SCALAR and _moves_any(model, j, joints):
             kind = "base floats in the file and" if int(model.jnt_type[j]) == FREE else "ball joint"
@@ -235,13 +240,15 @@ def _position(model: mujoco.MjModel, joint: int, qpos: np.ndarray) -> str:
     return f"{_joint(model, joint)} at {value:.4g} {unit}{outside}"
 
 
-def _tool_note(names: list[str], joints: list[int], parent: Parents) -> Iterator[str]:
+def _tree_notes(names: list[str], joints: list[int], parent: Parents) -> Iterator[str]:
     n = len(joints)
     if path(parent, n - 1) != tuple(range(n)):
         yield (
             f"the robot branches; payload, contact and pushes are looked for on the link of its last joint, "
             f"'{names[joints[-1]]}'"
         )
+    if parent.count(-1) > 1:
+        yield "its branches part at the base, which is taken to stand still"
 
 
 def _joint(model: mujoco.MjModel, joint: int) -> str:
@@ -249,6 +256,6 @@ def _joint(model: mujoco.MjModel, joint: int) -> str:
     return f"'{name}'" if name else f"a nameless joint of body '{model.body(model.jnt_bodyid[joint]).name}'"
 
 
-def _listed(names: list[str], most: int = 20) -> str:
+def _listed(names: Sequence[str], most: int = 20) -> str:
     shown = ", ".join(f"'{name}'" for name in names[:most])
     return shown + (f" and {len(names) - most} more" if len(names) > most else "") if names else "none"

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-BODY, SITE = int(mujoco.mjtObj.mjOBJ_BODY), int(mujoco.mjtObj.mjOBJ_SITE)
+SITE = int(mujoco.mjtObj.mjOBJ_SITE)
 EQ = mujoco.mjtEq
 WRAP = mujoco.mjtWrap
 
@@ -39,7 +39,10 @@ def couplings(model: mujoco.MjModel, mimics: tuple[tuple[str, str, float, float]
 
 def _mimics(model: mujoco.MjModel, mimics: tuple[tuple[str, str, float, float], ...]) -> Iterator[Coupling]:
     for follower, leader, factor, offset in mimics:
-        j, k = model.joint(follower).id, model.joint(leader).id
+        j, k = model.joint(follower).id, mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, leader)
+        if k < 0:
+            yield Coupling((j,), f"it mimics '{leader}', a joint that does not move or is not there")
+            continue
         at = int(model.jnt_qposadr[k])
         yield Coupling((j, k), f"'{follower}' mimics '{leader}', so that one motor moves both", j,
                        lambda qpos, at=at, a=factor, b=offset: a * qpos[at] + b)  # fmt: skip
@@ -55,6 +58,8 @@ def _equalities(model: mujoco.MjModel) -> Iterator[Coupling]:
             yield Coupling(tuple(j for j in (first, second) if j >= 0), f"{name} ties it", first, follows)
         elif kind in (int(EQ.mjEQ_CONNECT), int(EQ.mjEQ_WELD)):
             ends = [int(model.site_bodyid[i]) if int(model.eq_objtype[e]) == SITE else i for i in (first, second)]
+            if any(model.body_mocapid[i] >= 0 for i in ends):
+                continue  # a simulation's handle, which no real arm has
             yield Coupling(_between(model, [max(i, 0) for i in ends]), f"{name} closes a loop with it")
         elif kind == int(EQ.mjEQ_TENDON):
             joints = {j for t in (first, second) if t >= 0 for j in _of_tendon(model, t)}
@@ -70,11 +75,11 @@ def _polynomial(model: mujoco.MjModel, e: int, leader: int, qpos: np.ndarray) ->
 
 
 def _tendons(model: mujoco.MjModel) -> Iterator[Coupling]:
-    """Tendons that pull: those with a spring, friction, limits, inertia or an actuator."""
+    """Tendons that pull: those with a spring, friction, inertia or an actuator; limits are no more than joints' own."""
     on_tendon = np.asarray(model.actuator_trntype) == int(mujoco.mjtTrn.mjTRN_TENDON)
     driven = {int(i) for i in np.asarray(model.actuator_trnid)[on_tendon, 0]} if model.nu else set()
     for t in range(model.ntendon):
-        fields = ("tendon_stiffness", "tendon_damping", "tendon_frictionloss", "tendon_limited", "tendon_armature")
+        fields = ("tendon_stiffness", "tendon_damping", "tendon_frictionloss", "tendon_armature")
         if t in driven or any(np.any(np.asarray(getattr(model, f, np.zeros(t + 1)))[t]) for f in fields):
             given = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TENDON, t)
             name = f"tendon '{given}'" if given else "a tendon"

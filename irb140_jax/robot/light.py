@@ -19,7 +19,7 @@ class LightModel(NamedTuple):
 
     Attributes:
         model: The model.
-        notes: Sentences on bodies that were mended, by their names.
+        notes: What was mended, by body, as the rest of "link x has ...".
         unweighed: Bodies whose mass is unknown, since it is that of a mesh that is not there: its file, by their names.
     """
 
@@ -111,6 +111,6 @@ def _mended(body: mujoco.MjsBody) -> str | None:
     else:
         body.fullinertia = mended[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return (
-        f"body '{body.name}' has principal moments of inertia {described(inertia)}, of which the largest exceeds "
+        f"principal moments of inertia {described(inertia)}, of which the largest exceeds "
         f"the sum of the others; no body has that: it counts with {described(mended)}"
     )

@@ -89,11 +89,11 @@ def link_inertials(
     for link in range(n):
         bodies = [body for body in range(1, model.nbody) if choice.carrier[body] == link]
         mass[link], com[link], whole = _lumped([_body_inertial(model, tree, body, link, given) for body in bodies])
-        broken = [name for body in bodies if (name := model.body(body).name) in given]
+        parts = {name: given[name] for body in bodies if (name := model.body(body).name) in given}
+        broken = {name: x for name, x in parts.items() if is_negative(x.mass, x.inertia) or is_lopsided(x.inertia)}
         if broken:
-            whole, note = _mended(mass[link], whole, broken, given, source)
-            notes.append(note)
-        inertia[link] = whole
+            notes.append(_what_was_mended(mass[link], whole, broken, source))
+        inertia[link] = possible(whole) if parts else whole
     return mass, com, inertia, notes
 
 
@@ -124,21 +124,18 @@ def _body_inertial(
     return Inertial(float(model.body_mass[body]), centre, A @ np.diag(model.body_inertia[body]) @ A.T)
 
 
-def _mended(
-    mass: float, whole: np.ndarray, broken: list[str], given: Mapping[str, Inertial], source: str
-) -> tuple[np.ndarray, str]:
-    """The link's inertia made possible, and what was wrong with its parts."""
-    name, part = broken[0], given[broken[0]]
+def _what_was_mended(mass: float, whole: np.ndarray, broken: Mapping[str, Inertial], source: str) -> str:
+    """What was wrong with the link's parts, and what it counts with."""
+    name, part = next(iter(broken.items()))
     what = f"link '{name}' has mass {part.mass:g} kg and principal moments of inertia {described(part.inertia)}"
-    more = f" (so have {', '.join(repr(b) for b in broken[1:])})" if broken[1:] else ""
-    if is_negative(mass, whole) or min(given[b].mass for b in broken) < 0.0:
-        raise RobotError(f"{source}: {what}; none may be negative: mend its <inertial>")
+    more = f" (as broken: {', '.join(repr(b) for b in list(broken)[1:])})" if len(broken) > 1 else ""
+    if is_negative(mass, whole) or min(x.mass for x in broken.values()) < 0.0:
+        raise RobotError(f"{source}: {what}{more}; none may be negative: mend its <inertial>")
     if not is_lopsided(whole):
-        return possible(whole), f"{what}{more}, which no body has; with all that is fixed to it, it is a possible one"
-    mended = possible(whole)
-    return mended, (
-        f"{what}, of which the largest exceeds the sum of the others{more}; no body has that: with all that is fixed "
-        f"to it, it counts with {described(mended)}"
+        return f"{what}{more}, which no body has; with all that is fixed to it, it is a possible one"
+    return (
+        f"{what}{more}, of which the largest exceeds the sum of the others; no body has that: with all that is fixed "
+        f"to it, it counts with {described(possible(whole))}"
     )
 
 

@@ -1,27 +1,19 @@
-"""The only reader of robot models: MuJoCo compiles MJCF or URDF, we take a chain or tree of joints out of it."""
+"""Out of a model that MuJoCo compiled to a `Robot`: the joints kept, with what stands still on their links."""
 
 import pathlib
-import warnings
-import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
-from typing import TypeVar
+from collections.abc import Mapping, Sequence
 
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 
 from irb140_jax.errors import RobotError
-from irb140_jax.robot.choose import Choice, Wish, choose
+from irb140_jax.robot.choose import Choice, Wish, choose, scalar_joints
+from irb140_jax.robot.description import Description, description
 from irb140_jax.robot.drive import Drives, drives
-from irb140_jax.robot.inertia import Inertial
-from irb140_jax.robot.light import light_model
 from irb140_jax.robot.links import link_frames_at_rest, link_inertials, tool_frame
 from irb140_jax.robot.refuse import refuse_impossible_numbers, refuse_unsupported
 from irb140_jax.robot.robot import Robot
-from irb140_jax.robot.urdf import prepared_urdf
-
-Compiled = TypeVar("Compiled")
 
 
 def load_robot(
@@ -49,16 +41,19 @@ def load_robot(
         RobotError: The file can't be read, or the joints kept are touched by what a `Robot` can't represent; the
             message names it.
     """
-    path = pathlib.Path(path)
-    root = _root(path)
-    if root.tag == "robot":
-        urdf = prepared_urdf(root, str(path))
-        model, warned = _compiled(lambda: mujoco.MjModel.from_xml_string(urdf.text), path)
-        wish = Wish(joints, hold or {}, fix_base, urdf.floating, urdf.mimics)
-        return _robot(model, wish, urdf.broken, str(path), urdf.effort, urdf.velocity, urdf.link_notes, warned)
-    light, warned = _compiled(lambda: light_model(path), path)
-    return _robot(light.model, Wish(joints, hold or {}, fix_base), {}, str(path), {}, {}, light.notes, warned,
-                  light.unweighed)  # fmt: skip
+    return _robot(description(path), Wish(joints, hold or {}, fix_base))
+
+
+def movable_joints(path: str | pathlib.Path) -> tuple[str, ...]:
+    """Names of all hinges and slides of a model file, of which `load_robot` may be given some.
+
+    Args:
+        path: MJCF or URDF file.
+
+    Raises:
+        RobotError: The file can't be read.
+    """
+    return scalar_joints(description(path).model)
 
 
 def robot_from_model(
@@ -84,23 +79,15 @@ def robot_from_model(
     Raises:
         RobotError: The joints kept are touched by what a `Robot` can't represent.
     """
-    return _robot(model, Wish(joints, hold or {}, fix_base), {}, source, effort or {}, velocity or {}, {}, notes)
+    said = Description(model, source, effort=effort or {}, velocity=velocity or {}, notes=notes)
+    return _robot(said, Wish(joints, hold or {}, fix_base))
 
 
-def _robot(
-    model: mujoco.MjModel,
-    wish: Wish,
-    broken: Mapping[str, Inertial],
-    source: str,
-    effort: Mapping[str, float],
-    velocity: Mapping[str, float],
-    link_notes: Mapping[str, str],
-    notes: tuple[str, ...],
-    unweighed: Mapping[str, str] = MappingProxyType({}),
-) -> Robot:
-    choice = choose(model, wish, source)
+def _robot(said: Description, wish: Wish) -> Robot:
+    model, source = said.model, said.source
+    choice = choose(said, wish)
     refuse_unsupported(model, choice, source)
-    for body, file in unweighed.items():
+    for body, file in said.unweighed.items():
         if choice.carrier[model.body(body).id] >= 0:
             raise RobotError(f"{source}: body '{body}' has its mass from a mesh that is not there ({file}): put the "
                              "file there, or give the body an <inertial>")
@@ -108,7 +95,7 @@ def _robot(
     dofs = model.jnt_dofadr[own]
     names = tuple(model.joint(i).name for i in own)
     tree = link_frames_at_rest(model, choice)
-    mass, com, inertia, mended = link_inertials(model, choice, tree, broken, source)
+    mass, com, inertia, mended = link_inertials(model, choice, tree, said.broken, source)
     drive = Drives(*(values[own] for values in drives(model)))
     limited = model.jnt_limited[own].astype(bool)
     lower, upper = model.jnt_range[own].T
@@ -127,8 +114,8 @@ def _robot(
         base_rotation=tree.base_rotation, base_position=tree.base_position,
         tool_rotation=tool_rotation, tool_position=tool_position,
         lower=np.where(limited, lower, -np.inf), upper=np.where(limited, upper, np.inf),
-        velocity_limit=np.minimum(_velocity_limit(model, source)[own], _by_name(velocity, names)),
-        effort_limit=np.minimum(drive.effort, _by_name(effort, names)),
+        velocity_limit=np.minimum(_velocity_limit(model, source)[own], _by_name(said.velocity, names)),
+        effort_limit=np.minimum(drive.effort, _by_name(said.effort, names)),
     )  # fmt: skip
     refuse_impossible_numbers(fields, names, source)
     return Robot(
@@ -136,43 +123,21 @@ def _robot(
         joint_names=names,
         is_slide=tuple(int(kind) == int(mujoco.mjtJoint.mjJNT_SLIDE) for kind in model.jnt_type[own]),
         name=_name(model, source),
-        notes=(*_of_links(model, choice, link_notes), *mended, *notes, *choice.notes),
+        notes=(*_of_links(model, choice, said.link_notes), *mended, *said.notes, *choice.notes),
         parent=choice.parent,
     )
 
 
 def _of_links(model: mujoco.MjModel, choice: Choice, notes: Mapping[str, str]) -> list[str]:
-    """Notes on links that the robot moves."""
-    return [note for name, note in notes.items() if choice.carrier[model.body(name).id] >= 0]
-
-
-def _root(path: pathlib.Path) -> ET.Element:
-    if not path.is_file():
-        raise RobotError(f"{path}: there is no such file: give the MJCF or URDF file of the robot")
-    try:
-        root = ET.parse(path).getroot()
-    except (ET.ParseError, UnicodeDecodeError, LookupError) as error:
-        raise RobotError(f"{path}: not an XML file ({error}): give an MJCF or URDF file") from error
-    if root.tag not in ("mujoco", "robot"):
-        raise RobotError(f"{path}: root element <{root.tag}>; allowed: <mujoco> (MJCF) or <robot> (URDF): convert it")
-    return root
-
-
-def _compiled(compile_model: Callable[[], Compiled], path: pathlib.Path) -> tuple[Compiled, tuple[str, ...]]:
-    """What MuJoCo compiles, and its warnings as notes: by itself it would print them and leave a log file behind."""
-    warned: list[str] = []
-    mujoco.set_mju_user_warning(warned.append)
-    try:
-        with warnings.catch_warnings(record=True) as raised:
-            warnings.simplefilter("always")
-            compiled = compile_model()
-        said = [*warned, *(str(warning.message) for warning in raised)]
-        return compiled, tuple(f"MuJoCo warns: {' '.join(text.split())}" for text in said)
-    except (ValueError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split())
-        raise RobotError(f"{path}: MuJoCo can't compile this model: {reason}: mend the file there") from error
-    finally:
-        mujoco.set_mju_user_warning(None)
+    """Notes on bodies that the robot moves, one sentence for all of whom the same is to be said."""
+    alike: dict[str, list[str]] = {}
+    for name, note in notes.items():
+        if choice.carrier[model.body(name).id] >= 0:
+            alike.setdefault(note, []).append(f"'{name}'")
+    return [
+        f"link {names[0]} has {note}" if len(names) == 1 else f"each of the links {', '.join(names)} has {note}"
+        for note, names in alike.items()
+    ]
 
 
 def _enabled(model: mujoco.MjModel, part: str) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from irb140_jax.errors import RobotError
-from irb140_jax.robot.inertia import NEGLIGIBLE, Inertial, is_lopsided, is_negative
+from irb140_jax.robot.inertia import NEGLIGIBLE, Inertial, is_lopsided, moments
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -28,8 +28,8 @@ class PreparedURDF(NamedTuple):
         text: The XML.
         effort: Largest torque by joint name [N m or N], where the file gives one above zero.
         velocity: Largest speed by joint name [rad/s or m/s], where the file gives one above zero.
-        link_notes: Plain sentences about what was supplied, by the link they are about.
-        broken: Inertials that no body has, by link; MuJoCo gets none for them.
+        link_notes: What was supplied, by link, as the rest of "link x has ...".
+        broken: Inertials that MuJoCo would refuse, by link; it gets none for them.
         floating: Links that a floating or planar joint carries.
         mimics: Joints that follow others: follower, leader, factor, offset.
     """
@@ -121,11 +121,12 @@ def _bare_joint(joint: ET.Element, links: set[str], source: str) -> ET.Element:
 
 
 def _broken(link: ET.Element, source: str) -> Inertial | None:
-    """The link's inertial where no body has it, which MuJoCo would refuse; else None."""
+    """The link's inertial where MuJoCo would refuse it: where no body has it, or a rod has no thickness; else None."""
     mass = _numbers(link.find("inertial/mass"), ("value",), link, source)[0]
     xx, xy, xz, yy, yz, zz = _numbers(link.find("inertial/inertia"), _INERTIA, link, source)
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if not is_negative(mass, inertia) and not is_lopsided(inertia):
+    low, _, high = moments(inertia)
+    if mass >= 0.0 and (low > 0.0 or high == 0.0) and not is_lopsided(inertia):
         return None
     origin = link.find("inertial/origin")
     placed = {} if origin is None else origin.attrib
@@ -157,11 +158,8 @@ def _mimics(robot: ET.Element, source: str) -> Iterator[tuple[str, str, float, f
         mimic, name = joint.find("mimic"), joint.get("name", "")
         if mimic is None or name not in moving:
             continue
-        leader = mimic.get("joint", "")
-        if leader not in moving:
-            raise RobotError(f"{source}: joint '{name}' mimics '{leader}', but no such joint moves: mend its <mimic>")
         try:
-            yield name, leader, float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))
+            yield name, mimic.get("joint", ""), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))
         except ValueError as error:
             raise RobotError(f"{source}: joint '{name}': {error}: give numbers in its <mimic>") from error
 
@@ -203,9 +201,9 @@ def _notes(robot: ET.Element) -> dict[str, str]:
     for link in robot.findall("link"):
         name, inertia, mass = link.get("name"), link.find("inertial/inertia"), link.find("inertial/mass")
         if name in moved and (mass is None or not _any(mass, ("value",))):
-            notes[str(name)] = f"link '{name}' has no mass of its own in the file"
+            notes[str(name)] = "no mass of its own in the file"
         elif name in moved and (inertia is None or not _any(inertia, ("ixx", "iyy", "izz"))):
-            notes[str(name)] = f"link '{name}' has no rotational inertia in the file and counts as a point mass"
+            notes[str(name)] = "no rotational inertia in the file and counts as a point mass"
     return notes
 
 

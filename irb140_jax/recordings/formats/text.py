@@ -19,6 +19,7 @@ from irb140_jax.recordings.units import is_unit, known_unit, stated_unit
 SEPARATORS = (";", "\t", "|", ",", "blanks")  # a mark of decimals may be a comma, so the comma comes late
 SPOKEN = {";": "semicolons", "\t": "tabs", "|": "bars", "blanks": "blanks"}
 COMMENTS = ("#", "%", "//")
+COMMA_NUMBER = r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?"
 HEAD_LINES, MAX_LINE = 300, 10**6  # lines in which the header is looked for, letters that a line may have
 CONTROL = re.compile("[\x00-\x08\x0e-\x1f\x7f-\x84\x86-\x9f]")  # in no text that a person or a logger writes
 BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
@@ -62,6 +63,9 @@ def text_table(path: pathlib.Path, options: FileOptions) -> Table:
     if layout.separator != "," and options.separator is None:
         notes.append(f"The columns are parted by {SPOKEN[layout.separator]} instead of commas; read so")
     frame = _frame(text, layout, options)
+    if layout.decimal == "." and layout.separator != "," and options.decimal is None and _has_commas(frame):
+        # The rows that were looked at held whole numbers only.
+        frame = _frame(text, dataclasses.replace(layout, decimal=","), options)
     if frame.size > MAX_VALUES:
         raise RecordingError(f"{path}: holds {frame.size:.3g} values; allowed are {MAX_VALUES:.0g}: cut it into "
                              "shorter recordings")
@@ -173,7 +177,7 @@ def _are_numbers(fields: list[str], line: str, options: FileOptions) -> bool:
 
 
 def _decimal(fields: list[str], separator: str) -> str:
-    commas = separator != "," and any(re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", field) for field in fields)
+    commas = separator != "," and any(re.fullmatch(COMMA_NUMBER, field) for field in fields)
     return "," if commas else "."
 
 
@@ -208,6 +212,12 @@ def _frame(text: str, layout: Layout, options: FileOptions) -> pd.DataFrame:
             skiprows=layout.first, index_col=False, skipinitialspace=True, comment=(options.comment or "#")[:1],
             low_memory=False,
         )  # fmt: skip
+
+
+def _has_commas(frame: pd.DataFrame) -> bool:
+    """Whether a column of text holds numbers with a decimal comma."""
+    texts = (frame[name].dropna() for name in frame.columns if not pd.api.types.is_numeric_dtype(frame[name].dtype))
+    return any(bool(column.astype(str).str.fullmatch(COMMA_NUMBER).any()) for column in texts)
 
 
 def _is_number(text: str) -> bool:
