@@ -18,7 +18,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -93,7 +93,7 @@ class Arm:
         (folder / "arm.xml").write_text(self.xml)
         return ["diagnose", folder / name, "--robot", folder / "arm.xml", "--out", folder / "out", *more]
 
-    def written(self, table: pd.DataFrame, path: pathlib.Path) -> bytes:
+    def written(self, table: Any, path: pathlib.Path) -> bytes:
         """A recording on disk, by its suffix."""
         if path.suffix == ".npz":
             np.savez(path, **{name: table[name].to_numpy() for name in table})
@@ -173,16 +173,20 @@ class Arm:
 
             return make
 
-        columns = {name: self.table[name].to_numpy() for name in self.table}
+        columns: dict[str, Any] = {name: self.table[name].to_numpy() for name in self.table}
+        def with_t(t: Any) -> Callable[[pathlib.Path], None]:
+            changed: dict[str, Any] = {**columns, "t": t}
+            return lambda path: np.savez(path, **changed)
+
         yield case("an .npy under .npz", npy)
         yield case("1e15 declared values", declared)
         yield case("text members", members(b"hello"))
         yield case("a member of 200 MB of zeros", members(bytes(200 * 2**20)))
-        yield case("objects", lambda p: np.savez(p, **columns | {"t": np.array([{}] * 1200)}))
-        yield case("complex numbers", lambda p: np.savez(p, **columns | {"t": 1j * columns["t"]}))
-        yield case("three dimensions", lambda p: np.savez(p, **columns | {"t": np.zeros((3, 3, 3))}))
-        yield case("columns of two lengths", lambda p: np.savez(p, **columns | {"t": columns["t"][:-5]}))
-        yield case("words", lambda p: np.savez(p, **columns | {"t": np.array(["x"] * 1200)}))
+        yield case("objects", with_t(np.array([{}] * 1200)))
+        yield case("complex numbers", with_t(1j * columns["t"]))
+        yield case("three dimensions", with_t(np.zeros((3, 3, 3))))
+        yield case("columns of two lengths", with_t(columns["t"][:-5]))
+        yield case("words", with_t(np.array(["x"] * 1200)))
         lists = self.table.assign(t=[[float(t)] for t in self.table["t"]])
         yield case("lists in a column", lambda p: lists.to_parquet(p), "r.parquet")
         yield case("no rows", lambda p: self.table[:0].to_parquet(p), "r.parquet")
@@ -193,7 +197,7 @@ class Arm:
         """Tables that can be read and hold what no robot did."""
         q, tau, n = f"q.{self.joints[0]}", f"tau.{self.joints[0]}", len(self.table)
 
-        def case(name: str, spoil: Callable[[pd.DataFrame], pd.DataFrame | None], refuse: bool = True) -> Case:
+        def case(name: str, spoil: Callable[[pd.DataFrame], Any], refuse: bool = True) -> Case:
             def prepare(folder: pathlib.Path) -> list:
                 table = self.table.copy()
                 changed = spoil(table)
@@ -202,7 +206,7 @@ class Arm:
 
             return Case("odd values", name, prepare, refuse)
 
-        def put(column: str, rows: slice, value: object) -> Callable[[pd.DataFrame], None]:
+        def put(column: str, rows: slice, value: object) -> Callable[[pd.DataFrame], Any]:
             def spoil(table: pd.DataFrame) -> None:
                 table[column] = table[column].astype(object)
                 table.loc[table.index[rows], column] = value  # pyright: ignore[reportArgumentType]
