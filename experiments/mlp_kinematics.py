@@ -18,7 +18,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import tyro
-from mlp_report import figure12, page
+from mlp_report import FILE, figure12, page, runs_of, tests
+from study_provenance import made, store
 
 from irb140_jax import learned
 from irb140_jax.compilation_cache import set_up_compilation_cache
@@ -85,6 +86,7 @@ class Case:
         warm_up: Share of the epochs over which it rises to that, which the text does not name.
         refined: Steps of Levenberg-Marquardt afterwards, which the text does not name.
         seed: Of the first weights and of the order of the samples.
+        optimiser: "plain" as the text tells, or "adam" with clipped steps, ours.
     """
 
     direction: learned.Direction
@@ -100,6 +102,7 @@ class Case:
     warm_up: float = 0.0
     refined: int = 0
     seed: int = 0
+    optimiser: Literal["adam", "plain"] = "adam"
 
     def __str__(self) -> str:
         return self.reading + f", seed {self.seed}" * bool(self.seed)
@@ -108,6 +111,7 @@ class Case:
     def reading(self) -> str:
         """What every seed of it shares."""
         parts = [self.direction, self.region, self.hidden]
+        parts += ["plain gradient descent"] * (self.optimiser == "plain")
         parts += ["with velocities"] * self.velocities + ["MAE"] * (self.loss == "mae")
         parts += ["warmed up"] * bool(self.warm_up) + ["then Levenberg-Marquardt"] * bool(self.refined)
         return ", ".join(parts + [f"{self.penalty} penalty {self.weight:g}"] * (self.penalty != "none"))
@@ -115,7 +119,8 @@ class Case:
     @property
     def settings(self) -> learned.Settings:
         """How to train."""
-        return learned.Settings(epochs=self.epochs, batch=self.batch, rate=self.rate, warm_up=self.warm_up)
+        return learned.Settings(epochs=self.epochs, batch=self.batch, rate=self.rate, warm_up=self.warm_up,
+                                optimiser=self.optimiser)  # fmt: skip
 
     def task(self, robot: Robot) -> learned.Task:
         """What is asked."""
@@ -146,7 +151,11 @@ ONCE = (
     *NEAR_SINGULAR,
     COLD[1],
     NEAREST[1],
+    Case("forward", "task", "1 x 50", 1500, 250, optimiser="plain"),
+    Case("inverse", "task", "1 x 50", 1500, 250, optimiser="plain"),
     Case("forward", "task", "1 x 50", 400, 250, velocities=True),
+    Case("inverse", "task", "1 x 50", 400, 250, velocities=True),
+    Case("inverse", "task", "4 x 122", 150, 1000, velocities=True, warm_up=WARM_UP),
     Case("forward", "whole", "4 x 122", 200, 500),
     # At a rate of 0.01 layers as wide as these are thrown out of the workspace by the first steps.
     Case("forward", "task", "4 x 488", 15, 250, rate=1e-3),
@@ -159,13 +168,13 @@ CASES = (
 )
 
 
-def samples_of(config: Config, case: Case, robot: Robot) -> tuple[learned.Samples, learned.Samples]:
-    """Samples to learn from, and others to validate with."""
+def samples_of(config: Config, case: Case, robot: Robot) -> tuple[learned.Samples, ...]:
+    """Samples to learn from, others to validate with, and a third set that nothing is chosen by."""
     low, high = (jnp.radians(jnp.array(end)) for end in REGIONS[case.region])
     keys = jax.random.split(jax.random.key(sorted(REGIONS).index(case.region)))
-    counts = config.samples
-    first, second = (learned.joint_samples(robot, low, high, n, key=k) for n, k in zip(counts, keys, strict=True))
-    return first, second
+    counts = (*config.samples, config.samples[1])
+    keys = [*keys, jax.random.fold_in(keys[1], 1)]
+    return tuple(learned.joint_samples(robot, low, high, n, key=k) for n, k in zip(counts, keys, strict=True))
 
 
 def trained(config: Config, case: Case, folder: pathlib.Path) -> dict:
@@ -218,7 +227,7 @@ def judged(task: learned.Task, network: learned.KinematicMlp, *parts: learned.Sa
     """Errors [mm] on training and validation; of an inverse, what it does near singular poses."""
     weights = sum(x.size for x in jax.tree.leaves(eqx.filter(network.layers, eqx.is_array)))
     row: dict = {"weights": weights}
-    for name, samples in zip(("training", "validation"), parts, strict=True):
+    for name, samples in zip(("training", "validation", "test"), parts, strict=True):
         error = 1e3 * np.asarray(eqx.filter_jit(learned.position_errors)(task, network, samples))
         row |= {name: _round(error.mean()), f"{name}_p95": _round(np.percentile(error, 95))}
     if task.direction == "inverse":
@@ -279,10 +288,14 @@ def main() -> None:
     set_up_compilation_cache()
     rows = run(config)
     stem = "mlp_kinematics_smoke" if config.smoke else "mlp_kinematics"
-    (config.out / f"{stem}.json").write_text(json.dumps({"regions": REGIONS, "cases": rows}) + "\n", encoding="utf-8")
-    (config.out / f"{stem}.md").write_text(page(rows, REGIONS), encoding="utf-8")
+    store(runs_of(rows), config.out / FILE)
+    told = tests(rows, config.out)
+    options = {name: str(value) for name, value in vars(config).items() if name == "smoke"}
+    result = {"made": made(options), "regions": REGIONS, "cases": rows, "tests": told}
+    (config.out / f"{stem}.json").write_text(json.dumps(result) + "\n", encoding="utf-8")
+    (config.out / f"{stem}.md").write_text(page(rows, REGIONS, told), encoding="utf-8")
     figure12(rows, config.figures)
-    print(page(rows, REGIONS))
+    print(page(rows, REGIONS, told))
 
 
 if __name__ == "__main__":

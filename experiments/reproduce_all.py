@@ -2,6 +2,7 @@
 
     python experiments/reproduce_all.py                               # the study's arm; half an hour on one core
     python experiments/reproduce_all.py --robot arm.xml [--joints n]  # the same tables for any other arm
+    python experiments/reproduce_all.py --robot arm.xml --quick       # without the searches by the closed loop
     python experiments/reproduce_all.py --smoke                       # all steps as small as can be, in a new folder
 
 A step whose result is there for the same choices is left out (--again runs it nevertheless); an interrupted step goes
@@ -18,10 +19,13 @@ import tempfile
 import time
 from collections.abc import Callable
 
+import embedded_model
+import noisy_swarms
 import study_page
 import table3_swarms
 import table4_control
 import tables_1_2_arm
+import time_per_iteration
 import torque_swarms
 import tracking_swarms
 import tyro
@@ -36,9 +40,11 @@ class Config(StudyConfig):
 
     Attributes:
         again: Run every step, whether its result is there or not.
+        quick: Leave out the searches by the closed loop, which take most of the time; the page says so.
     """
 
     again: bool = False
+    quick: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,8 +80,11 @@ def steps(config: Config, arm: StudyArm) -> list[Step]:
         ("table 3, figures 6 to 9: swarms on known answers", table3_swarms, ("table3_swarms", "table3_sets"),
          [f"figure{k}.svg" for k in range(6, 10)]),
         ("table 4, figures 14 to 17: sliding mode control", table4_control, ("table4_control",),
-         [f"figure{k}.png" for k in range(14, 18)]),
+         [f"figure{k}.svg" for k in range(14, 18)]),
+        ("time of an iteration", time_per_iteration, ("time_per_iteration",), ()),
         ("beyond: swarms on torque", torque_swarms, ("torque_swarms",), ()),
+        ("beyond: swarms whose every evaluation has new noise", noisy_swarms, ("noisy_swarms",), ()),
+        ("beyond: the model on an embedded controller", embedded_model, ("embedded_model",), ()),
         ("beyond: swarms on tracking, smoothness, energy", tracking_swarms, ("tracking_swarms",),
          ["figure_tracking.svg"]),
     ):  # fmt: skip
@@ -83,6 +92,8 @@ def steps(config: Config, arm: StudyArm) -> list[Step]:
         own = module.Config(**shared)
         so_far += f" {title} {own.said()}"
         found.append(Step(title, lambda m=module, c=own: m.main(c), outputs, so_far))
+    if config.quick:
+        found = [step for step in found if "tracking" not in step.title]
     network = pathlib.Path(__file__).with_name("mlp_kinematics.py")
     # The network learns the IRB 140's own kinematics, whatever the arm; it has a smoke run of its own.
     if network.is_file() and arm.is_studys and not config.smoke:

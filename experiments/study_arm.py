@@ -174,4 +174,5 @@ class StudyConfig(ArmChoice):
         """The choices that a result depends on, to be stored beside it."""
         of_no_matter = ("out", "figures", "devices")
         told = {name: value for name, value in vars(self).items() if name not in of_no_matter}
-        return {name: str(value) if isinstance(value, pathlib.Path) else value for name, value in told.items()}
+        # The file's name, not where somebody keeps it.
+        return {name: value.name if isinstance(value, pathlib.Path) else value for name, value in told.items()}

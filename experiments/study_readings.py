@@ -33,6 +33,11 @@ PENALTY = {
     "t/T, absolute": identify.Penalty(weight=1.0, violation="absolute"),
 }
 DECODE = {"D1": swarm.Amplitude(), "D2": swarm.Bits(1), "D3, 8 bits": swarm.Bits(8), "D3, 12 bits": swarm.Bits(12)}
+# Bits that choose: between two sides of the own best, or between the own best and the best of all.
+CHOOSING = {"D4, one attractor": False, "D4, two attractors": True}
+PERTURBATION = 0.05  # [rad]
+START_SPEEDS = (0.1, 0.5, 1.0)  # Algorithm 1 begins with random velocities and does not say how large
+OTHER_BOXES = range(1, 11)
 LIMITS = (math.inf, 0.5, 0.2, 0.1, 0.05, 0.02)
 OTHERS = {
     "constricted": swarm.ConstrictedPso(),
@@ -52,13 +57,16 @@ class Reading:
         inertia: One of `INERTIA`.
         velocity_limit: Fraction of the box for PSO, rad for angles.
         walls: Whether positions are clamped to the box, angles to [0, pi/2].
-        decode: One of `DECODE`.
+        decode: One of `DECODE` or of `CHOOSING`.
         collapse: Whether bests are kept as measured bits.
         perturbed: Whether stagnation is answered by a perturbation.
         units: Of equation 20.
         width: Half of the box's width, as a fraction of the reference.
         place: Where the reference lies in the box: "centre", or "anywhere".
         penalty: One of `PENALTY`.
+        start_speed: Largest speed of PSO's particles at the start, as a fraction of the box.
+        perturbation: Largest size of an angle's perturbation [rad].
+        box: Which draw of "anywhere"; 0 in all readings, others to see what the draw does.
     """
 
     algorithm: str
@@ -72,6 +80,9 @@ class Reading:
     width: float = 0.5
     place: str = "centre"
     penalty: str = "t/T"
+    start_speed: float = 0.0
+    perturbation: float = PERTURBATION
+    box: int = 0
 
     @property
     def family(self) -> str:
@@ -81,7 +92,7 @@ class Reading:
     @property
     def problem(self) -> tuple:
         """What two algorithms compared with each other must share."""
-        return self.inertia, self.units, self.width, self.place, self.penalty
+        return self.inertia, self.units, self.width, self.place, self.penalty, self.box
 
     def __str__(self) -> str:
         parts = [self.algorithm]
@@ -93,7 +104,10 @@ class Reading:
         if self.family == "qpso":
             parts += ["perturbed" if self.perturbed else "not perturbed"]
         parts += [self.units, f"box {100 * self.width:g} %", self.place]
-        return ", ".join(parts + ([f"penalty {self.penalty}"] if self.penalty != "t/T" else []))
+        parts += [f"penalty {self.penalty}"] * (self.penalty != "t/T")
+        parts += [f"start v <= {self.start_speed:g}"] * (self.start_speed > 0.0)
+        parts += [f"perturbation {self.perturbation:g}"] * (self.perturbation != PERTURBATION)
+        return ", ".join(parts + [f"other box {self.box}"] * (self.box > 0))
 
 
 def rule(reading: Reading) -> swarm.Rule:
@@ -102,12 +116,14 @@ def rule(reading: Reading) -> swarm.Rule:
         return OTHERS[reading.algorithm]
     common = {"inertia": INERTIA[reading.inertia], "c1": C1, "c2": C2, "velocity_limit": reading.velocity_limit}
     if reading.algorithm == "pso":
-        return swarm.Pso(**common, outside=0.0 if reading.walls else math.inf)
+        return swarm.Pso(**common, outside=0.0 if reading.walls else math.inf, start_speed=reading.start_speed)
+    if reading.decode in CHOOSING:
+        return swarm.TwoAttractorsQpso(**common, both=CHOOSING[reading.decode])
     lowest, highest = (0.0, 0.5 * math.pi) if reading.walls else (-math.inf, math.inf)
     patience = 10.0 if reading.perturbed else math.inf
     return swarm.QubitPso(
         **common, decode=DECODE[reading.decode], collapse=reading.collapse, lowest=lowest, highest=highest,
-        patience=patience,
+        patience=patience, perturbation=reading.perturbation,
     )  # fmt: skip
 
 
@@ -115,7 +131,7 @@ def objective(reading: Reading, arm: StudyArm) -> identify.ParameterDistance:
     """Equation 20 over the arm's unknowns as the reading has it, box included."""
     sought = jnp.asarray(arm.searched)
     x = jnp.where(sought, arm.x, 1.0)  # what is not sought must not divide by zero; it is left out below
-    place = 0.5 if reading.place == "centre" else jnp.asarray(np.random.default_rng(0).uniform(size=x.shape))
+    place = 0.5 if reading.place == "centre" else jnp.asarray(np.random.default_rng(reading.box).uniform(size=x.shape))
     lower, upper = identify.box(x, reading.width, place=place)
     aim = identify.parameter_distance(x, lower, upper, units=reading.units, penalty=PENALTY[reading.penalty])
     return identify.ParameterDistance(
@@ -125,15 +141,32 @@ def objective(reading: Reading, arm: StudyArm) -> identify.ParameterDistance:
 
 def all_readings() -> Iterator[Reading]:
     """Every reading that is tried, each once."""
-    return iter(dict.fromkeys(itertools.chain(_pso(), _angles(), _bits(), _penalties(), _others())))
+    parts = (_pso(), _angles(), _bits(), _penalties(), _others(), _starts(), _thrown(), _choosing())
+    return iter(dict.fromkeys(itertools.chain(*parts)))
 
 
 def usual_readings() -> Iterator[Reading]:
     """Those of one problem, a box of 50 % whose middle is not the answer, without bits: enough for another arm."""
-    usual = Reading("pso", place="anywhere").units, 0.5, "anywhere", "t/T"
+    usual = Reading("pso", place="anywhere")
     for reading in all_readings():
-        if (reading.units, reading.width, reading.place, reading.penalty) == usual and reading.decode == "D1":
+        told = dataclasses.replace(reading, algorithm="pso", inertia=usual.inertia, velocity_limit=usual.velocity_limit,
+                                   walls=True, perturbed=True)  # fmt: skip
+        if told == usual:
             yield reading
+
+
+def literal_readings() -> Iterator[Reading]:
+    """What the text says and no more: w 0.99, no velocity limit; in the box of 50 % that is ours, as it names none."""
+    for reading in all_readings():
+        named = (reading.inertia, reading.velocity_limit, reading.units, reading.width, reading.penalty)
+        of_text = reading.family in PUBLISHED and reading.decode == "D1" and reading.perturbation == PERTURBATION
+        if of_text and named == ("w 0.99", math.inf, "normalised", 0.5, "t/T"):
+            yield reading
+
+
+def in_other_boxes(reading: Reading) -> list[Reading]:
+    """The same with other draws of where the reference lies in its box."""
+    return [dataclasses.replace(reading, place="anywhere", box=box) for box in OTHER_BOXES]
 
 
 def _problems(units: tuple[identify.Units, ...] = ("normalised", "si", "mm")) -> Iterator[dict]:
@@ -173,3 +206,21 @@ def _penalties() -> Iterator[Reading]:
 def _others() -> Iterator[Reading]:
     for name, problem in itertools.product(OTHERS, _problems()):
         yield Reading(name, **problem)
+
+
+def _starts() -> Iterator[Reading]:
+    for speed, inertia, limit, walls in itertools.product(START_SPEEDS, INERTIA, LIMITS, (True, False)):
+        for place in ("centre", "anywhere"):
+            yield Reading("pso", inertia, limit, walls, place=place, start_speed=speed)
+
+
+def _thrown() -> Iterator[Reading]:
+    for size, inertia, limit in itertools.product((0.01, 0.2, 0.5), INERTIA, LIMITS):
+        for place in ("centre", "anywhere"):
+            yield Reading("qpso", inertia, limit, place=place, perturbation=size)
+
+
+def _choosing() -> Iterator[Reading]:
+    for decode, inertia, limit in itertools.product(CHOOSING, INERTIA, LIMITS):
+        for place in ("centre", "anywhere"):
+            yield Reading("qpso", inertia, limit, True, decode, perturbed=False, place=place)

@@ -6,24 +6,42 @@
     python experiments/table3_swarms.py --smoke                      # seconds
 
 Readings are appended to table3_swarms.jsonl as they are done, so an interrupted run goes on where it stopped.  Writes
-table3_swarms.json and .md, the runs of the nearest pair of readings (table3_sets.json), and the figures of these runs.
+table3_runs.parquet (one row a run) and table3_readings.parquet (one row a reading), the table (table3_swarms.json and
+.md), the sets of the nearest pair of readings (table3_sets.json), and the figures of these.
 """
+# pandas types every column as all that it might be.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
 
 import dataclasses
 import itertools
 import json
-import pathlib
+import math
 import time
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pandas as pd
 import tyro
 from figures_swarms import draw
 from jax.sharding import Mesh
-from study_arm import StudyArm, StudyConfig
-from study_readings import ITERATIONS, PARTICLES, SEEDS, Reading, all_readings, objective, rule, usual_readings
-from table3_report import page, summary
+from study_arm import ROUND_OFF, StudyArm, StudyConfig
+from study_provenance import made, store
+from study_readings import (
+    ITERATIONS,
+    PARTICLES,
+    PUBLISHED,
+    SEEDS,
+    Reading,
+    all_readings,
+    in_other_boxes,
+    objective,
+    rule,
+    usual_readings,
+)
+from table3_report import EARLIER, READINGS, RUNS, page, pair_of, readings_of, runs_of, summary
+from table3_report import judged as judged_readings
 
 from irb140_jax import identify, swarm
 from irb140_jax.compilation_cache import set_up_compilation_cache
@@ -31,7 +49,13 @@ from irb140_jax.compilation_cache import set_up_compilation_cache
 
 @dataclasses.dataclass(frozen=True)
 class Config(StudyConfig):
-    """Which arm, and where to write."""
+    """Which arm, and where to write.
+
+    Attributes:
+        earlier: Take readings of measured bits, two thirds of the time, as means where table3_earlier.parquet has them.
+    """
+
+    earlier: bool = True
 
     @property
     def size(self) -> dict[str, int]:
@@ -40,8 +64,8 @@ class Config(StudyConfig):
 
     def readings(self, arm: StudyArm) -> list[Reading]:
         """What is tried."""
-        everything = list(all_readings() if arm.is_studys else usual_readings())
-        return everything[:: len(everything) // 4] if self.smoke else everything
+        few = [Reading(f, velocity_limit=v, place="anywhere") for f in PUBLISHED for v in (math.inf, 0.2, 0.02)]
+        return few if self.smoke else list(all_readings() if arm.is_studys else usual_readings())
 
 
 FULL = {"particles": PARTICLES, "iterations": ITERATIONS, "seeds": SEEDS}
@@ -64,25 +88,34 @@ def judged(reading: Reading, arm: StudyArm, size: dict[str, int], mesh: Mesh | N
     found = jax.device_get(minima(reading, arm, size, mesh))
     x = arm.full(found.x)
     com, inertia = arm.mape(np.asarray(x))
-    fitness, curves = np.asarray(found.fitness), np.asarray(found.history.best)
-    possible = consistent(x, arm.mass)
+    averaged = arm.mape(np.asarray(x).mean(axis=0))
+    curves = np.asarray(found.history.best)
+    aim = objective(reading, arm)
     return {
         "reading": dataclasses.asdict(reading), "name": str(reading), "com": _round(com), "inertia": _round(inertia),
-        "fitness": _round(fitness), "plateau": identify.plateau(curves.mean(axis=0)),
-        "plateau_of_runs": float(np.median([identify.plateau(c) for c in curves])),
-        "consistent": [float(np.mean(np.asarray(flag))) for flag in possible],
+        "fitness": _round(found.fitness), "plateau_of_mean": identify.plateau(curves.mean(axis=0)),
+        "plateau": [identify.plateau(c) for c in curves], "averaged": _round(np.array(averaged)),
+        "at_wall": at_wall(np.asarray(found.x), aim).sum(axis=1).tolist(),
+        "possible": np.asarray(consistent(x, arm.mass).pseudo_inertia).astype(int).tolist(),
     }  # fmt: skip
 
 
-def _round(values: np.ndarray) -> list[float]:
-    return [float(f"{v:.5g}") for v in values]
+def at_wall(x: np.ndarray, aim: identify.ParameterDistance) -> np.ndarray:
+    """Which unknowns (s, u) end at an end of their box, or beyond."""
+    lower, upper = np.asarray(aim.lower), np.asarray(aim.upper)
+    margin = ROUND_OFF * (upper - lower)
+    return (x <= lower + margin) | (x >= upper - margin)
 
 
-def run(config: Config, arm: StudyArm) -> list[dict]:
+def _round(values, digits: int = 5) -> list[float]:
+    return [float(f"{v:.{digits}g}") for v in np.asarray(values)]
+
+
+def run(config: Config, arm: StudyArm, readings: list[Reading]) -> list[dict]:
     """Judge the readings that the file of results lacks; all rows."""
     path = config.folder(arm) / "table3_swarms.jsonl"
     rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    done, readings, mesh = {row["name"] for row in rows}, config.readings(arm), config.mesh
+    done, mesh = {row["name"] for row in rows}, config.mesh
     started = time.perf_counter()
     for number, reading in enumerate(readings):
         if str(reading) in done:
@@ -109,7 +142,7 @@ def baselines(arm: StudyArm, few: bool) -> list[dict]:
     rows = []
     for name, way in itertools.islice(ways.items(), 2 if few else None):
         com, inertia = arm.mape(np.asarray(arm.full(jax.block_until_ready(way()))))
-        rows.append({"name": name, "com": _round(com), "inertia": _round(inertia)})
+        rows.append({"name": name, "com": float(com.max()), "inertia": float(inertia.max())})
     return rows
 
 
@@ -130,38 +163,63 @@ def pair_of_sets(pair: dict[str, str], arm: StudyArm, size: dict[str, int]) -> d
     by_name = {str(reading): reading for reading in (*all_readings(), *usual_readings())}
     told = {
         "arm": arm.name, "joints": list(arm.whole.joint_names[: len(arm.links)]), "names": list(arm.names),
-        "reference": np.asarray(arm.x).tolist(), "searched": arm.searched.tolist(), "sets": {}, "runs": {},
+        "reference": np.asarray(arm.x).tolist(), "searched": arm.searched.tolist(), "sets": {}, "runs": {}, "walls": {},
     }  # fmt: skip
     for family, name in pair.items():
         found = jax.block_until_ready(minima(by_name[name], arm, size))
-        x = np.asarray(arm.full(found.x))
-        com, inertia = arm.mape(x)
-        told["sets"][family.upper()] = x.tolist()
+        told["sets"][family.upper()] = [_round(row, 9) for row in np.asarray(arm.full(found.x))]
+        told["walls"][family.upper()] = at_wall(np.asarray(found.x), objective(by_name[name], arm)).sum(axis=0).tolist()
         told["runs"][family.upper()] = {
-            "reading": name, "com": _round(com), "inertia": _round(inertia), "fitness": _round(found.fitness),
-            "curves": [_round(curve) for curve in np.asarray(found.history.best)],
+            "reading": name, "fitness": _round(found.fitness),
+            "curves": [_round(curve, 3) for curve in np.asarray(found.history.best)],
         }  # fmt: skip
     return told
 
 
-def write_sets(config: Config, arm: StudyArm, result: dict) -> pathlib.Path:
-    """The sets of the nearest pair, stored, and the figures of them."""
-    sets = pair_of_sets({family: row["name"] for family, row in result["nearest_pair"].items()}, arm, config.size)
-    path = config.folder(arm) / "table3_sets.json"
-    path.write_text(json.dumps(sets) + "\n", encoding="utf-8")
-    draw(sets, config.figure_folder(arm))
-    return path
+def write_table(config: Config, arm: StudyArm) -> dict:
+    """The table, out of all runs, which are stored; the nearest pair once more in other boxes."""
+    folder = config.folder(arm)
+    readings = config.readings(arm)
+    by_name = {str(reading): reading for reading in readings}
+    earlier = pd.read_parquet(folder / EARLIER) if config.earlier and (folder / EARLIER).is_file() else None
+    kept = set() if earlier is None else set(earlier["reading"]) & set(by_name)
+    rows = run(config, arm, [reading for name, reading in by_name.items() if name not in kept])
+    rows = [row for row in rows if row["name"] in by_name]
+    kept -= {row["name"] for row in rows}
+    choices = readings_of(rows + ([] if earlier is None else _without_runs(earlier, kept, by_name)), earlier)
+    pair = pair_of(judged_readings(runs_of(rows), choices))
+    boxes = [other for row in pair.values() for other in in_other_boxes(by_name[row["reading"]])]
+    names = {str(reading) for reading in boxes[:: 5 if config.smoke else 1]}
+    in_boxes = [row for row in run(config, arm, boxes[:: 5 if config.smoke else 1]) if row["name"] in names]
+    runs = runs_of(rows + in_boxes)
+    choices = pd.concat([choices, readings_of(in_boxes)], ignore_index=True)
+    store(runs, folder / RUNS)
+    store(choices, folder / READINGS)
+    head = {"made": made(config.said()), "config": config.said(), "arm": arm.name}
+    return head | summary(judged_readings(runs, choices), baselines(arm, few=config.smoke), folder)
+
+
+def _without_runs(earlier: pd.DataFrame, kept: set[str], by_name: dict[str, Reading]) -> list[dict]:
+    """Readings of which only means are there."""
+    plateau = earlier.set_index("reading")["plateau_of_mean"]
+    return [
+        {"reading": dataclasses.asdict(by_name[name]), "name": name, "averaged": [math.nan, math.nan],
+         "plateau_of_mean": int(plateau[name])}
+        for name in earlier["reading"] if name in kept
+    ]  # fmt: skip
 
 
 def main(config: Config) -> None:
     """Table, sets and figures."""
     set_up_compilation_cache()
     arm = config.arm()
-    result = {"config": config.said(), "arm": arm.name} | summary(run(config, arm), baselines(arm, few=config.smoke))
+    result = write_table(config, arm)
     folder = config.folder(arm)
     (folder / "table3_swarms.json").write_text(json.dumps(result) + "\n", encoding="utf-8")
     (folder / "table3_swarms.md").write_text(page(result), encoding="utf-8")
-    write_sets(config, arm, result)
+    sets = pair_of_sets({f: row["name"] for f, row in result["nearest_pair"].items()}, arm, config.size)
+    (folder / "table3_sets.json").write_text(json.dumps({"made": result["made"]} | sets) + "\n", encoding="utf-8")
+    draw(sets, config.figure_folder(arm))
     print(page(result))
 
 

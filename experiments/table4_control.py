@@ -7,7 +7,7 @@
     python experiments/table4_control.py --smoke          # a minute
 
 The identified sets are those that table3_swarms.py of the same arm stored.  Every reading is stored when it is done; an
-interrupted run goes on after it.
+interrupted run goes on after it.  Writes table4_runs.parquet, one row a run, beside the table and the figures.
 """
 
 import dataclasses
@@ -24,10 +24,12 @@ import mujoco
 import numpy as np
 import tyro
 from study_arm import StudyArm, StudyConfig
+from study_provenance import made
 from table4_report import write_report
 
 from irb140_jax import control, dynamics, kinematics, simulate
 from irb140_jax.compilation_cache import set_up_compilation_cache
+from irb140_jax.dynamics.mass import mass_matrix
 from irb140_jax.errors import InputError
 from irb140_jax.oracle.closed_loop import sliding_mode_loop
 from irb140_jax.oracle.mjcf import mjcf
@@ -40,7 +42,15 @@ SIDES = ("controller", "plant", "both")
 # f of the law, and which speeds C acts on.
 LAWS = (("saturation", "computed"), ("tanh", "computed"), ("sign", "computed"), ("saturation", "passivity"))
 SETTLED = 2.0  # [s] after which tracking and roughness count: the error at the start has died out
+EARLY, THIRD = 2.0, 1.0 / 3.0  # [s], and of the duration: when energy is read off beside the end
 THIN = 20  # of the samples, one in so many goes into the figures
+PATHS = 5  # of those again, for the paths of all seeds
+# Our own choices, each changed alone, in the reading that changes least else.
+SENSITIVITY = (
+    ("layer", 0.02), ("layer", 0.5), ("slope", 5.0), ("slope", 20.0), ("authority", 10.0), ("authority", 40.0),
+    ("start_error", 0.05), ("start_error", 0.2), ("frequency", 0.25), ("frequency", 4.0), ("share", 0.2),
+)  # fmt: skip
+BASE = ("controller", "of peak", ("saturation", "computed"))
 FOURIER_SPEED = 0.1  # share of the joints' largest speeds, for arms that can't follow the circle: as calm as that
 
 
@@ -56,8 +66,12 @@ class Config(StudyConfig):
         start_error: Offset of every joint at the start [rad or m], for rise, settling and overshoot to have a meaning.
         share: Of the disturbance: of each joint's largest torque along the motion, or of its momentary torque.
         frequency: Of the disturbance [Hz].
+        slope: Rate at which the error dies out on the sliding surface [1/s].
+        layer: Half width of the boundary layer [rad/s or m/s].
+        authority: Acceleration that the switching gain stands for [rad/s^2 or m/s^2].
         rotors: Whether rotor inertia counts; the study has none. Default: with other arms than the study's, whose light
             wrists need it.
+        laws: How many of the control's laws are tried, from the first of `LAWS` on; of the study's own arm.
         oracle: Whether to run MuJoCo beside it, one run per model, condition and side.
     """
 
@@ -68,7 +82,11 @@ class Config(StudyConfig):
     start_error: float = 0.1
     share: float = 0.4
     frequency: float = 1.0
+    slope: float = 10.0
+    layer: float = 0.1
+    authority: float = 20.0
     rotors: bool | None = None
+    laws: int = len(LAWS)
     oracle: bool = True
 
 
@@ -119,18 +137,21 @@ class Task:
     arm: Robot
     reference: control.Reference
     motion: str
-    start: jax.Array
-    gain: jax.Array
     peak: np.ndarray
+
+    def settings(self, config: Config) -> dict[str, jax.Array]:
+        """Numbers that a run may change without a new program."""
+        told = {name: jnp.asarray(getattr(config, name)) for name in ("slope", "layer", "frequency")}
+        gain = config.authority * jnp.diag(mass_matrix(self.arm, self.arm.reference))
+        return told | {"gain": gain, "start": self.reference.q[0] + config.start_error}
 
 
 def task_of(config: Config, arm: Robot) -> Task:
-    """Motion, start, gains by the true model, and the largest torque that each joint needs."""
+    """Motion, and the largest torque that each joint needs."""
     reference, motion = motion_of(config, arm)
     needed = dynamics.inverse_dynamics_batch(arm, reference.q, reference.qd, reference.qdd)
-    gain = control.sliding_mode(arm).gain
     peak = np.abs(np.asarray(needed)).max(axis=0)
-    return Task(arm, reference, motion, reference.q[0] + config.start_error, gain, peak)
+    return Task(arm, reference, motion, peak)
 
 
 def motion_of(config: Config, arm: Robot) -> tuple[control.Reference, str]:
@@ -150,15 +171,18 @@ def motion_of(config: Config, arm: Robot) -> tuple[control.Reference, str]:
 
 
 def runs_of(config: Config, task: Task, law: tuple):
-    """A function of (plant, model, push, share), lanes first, that runs them and reads everything off them."""
+    """A function of (plant, model, push, share), lanes first, and settings, that runs them and reads all off them."""
     arm, reference = task.arm, task.reference
     wanted = reference.q[:-1]
 
-    def one(lane):
+    def one(lane, settings):
         plant, model, push, share = lane
-        controller = control.sliding_mode(with_set(arm, *model), gain=task.gain, switching=law[0], form=law[1])
-        disturbance = simulate.SinusoidalTorque(push, share, jnp.asarray(config.frequency), jnp.zeros(()))
-        run = simulate.rollout(with_set(arm, *plant), controller, reference, disturbance, q0=task.start)
+        controller = control.sliding_mode(
+            with_set(arm, *model), slope=settings["slope"], gain=settings["gain"], layer=settings["layer"],
+            switching=law[0], form=law[1],
+        )  # fmt: skip
+        disturbance = simulate.SinusoidalTorque(push, share, settings["frequency"], jnp.zeros(()))
+        run = simulate.rollout(with_set(arm, *plant), controller, reference, disturbance, q0=settings["start"])
         absolute, signed = simulate.energies(run)
         tool = jax.vmap(lambda q: kinematics.forward_kinematics(arm, q)[:3, 3])
         path = tool(run.q[::THIN])
@@ -170,6 +194,8 @@ def runs_of(config: Config, task: Task, law: tuple):
             "tool": jnp.sqrt(jnp.sum(miss**2) / jnp.sum(settled)),
             "roughness": simulate.roughness(run, SETTLED),
             "energy": absolute[-1],
+            "energy_early": absolute[round(EARLY / config.dt)],
+            "energy_third": absolute[round(THIRD * len(run.t))],
             "signed_energy": signed[-1],
         }
         traces = {"q": run.q[::THIN], "tau": run.tau[::THIN], "energy": absolute[::THIN], "tool": path}
@@ -201,11 +227,11 @@ def by_mujoco(config: Config, task: Task, args: tuple, lane: int, switching: str
     )
     reference = task.reference
     wanted = (np.asarray(reference.q), np.asarray(reference.qd), np.asarray(reference.qdd))
-    each = np.ones(task.arm.n)
-    law = (10.0 * each, np.asarray(task.gain), 0.1 * each, switching)  # the defaults of control.sliding_mode
+    each, settings = np.ones(task.arm.n), task.settings(config)
+    law = (config.slope * each, np.asarray(settings["gain"]), config.layer * each, switching)
     sine = lambda t: np.sin(2.0 * np.pi * config.frequency * t)  # noqa: E731
     disturbance = lambda t, tau: (push + share * tau) * sine(t)  # noqa: E731
-    return sliding_mode_loop(true, believed, wanted, law, (np.asarray(task.start), wanted[1][0]), disturbance)[0]
+    return sliding_mode_loop(true, believed, wanted, law, (np.asarray(settings["start"]), wanted[1][0]), disturbance)[0]
 
 
 def run(config: Config) -> dict:
@@ -216,24 +242,33 @@ def run(config: Config) -> dict:
     folder = config.folder(study) / "table4_runs"
     folder.mkdir(exist_ok=True)
     mark = _mark(config, sets, arm)
-    readings = []
+    readings, compiled = {}, {}
+
+    def add(name: str, own: Config, reading: tuple) -> None:
+        path = folder / f"{name}.npz"
+        if not _is_done(path, mark):
+            law = reading[2]
+            compiled[law] = compiled.get(law) or runs_of(config, task, law)
+            _store(path, mark, _reading(own, task, compiled[law], sets, reading))
+            print(f"  done: {name}", flush=True)
+        readings[name] = {"side": reading[0], "disturbance": reading[1], "law": list(reading[2])}
+
     # Other arms show whether the findings carry over; the text's open choices are the study's own.
-    for law in LAWS if study.is_studys and not config.smoke else LAWS[:1]:
-        compiled = runs_of(config, task, law)
+    whole = study.is_studys and not config.smoke
+    for law in LAWS[: config.laws] if whole else LAWS[:1]:
         for side, kind in itertools.product(SIDES, ("of peak", "of torque")):
-            name = " ".join((side, kind, *law)).replace(" ", "_")
-            path = folder / f"{name}.npz"
-            if not _is_done(path, mark):
-                _store(path, mark, _reading(config, task, compiled, sets, (side, kind, law)))
-                print(f"  done: {side}, disturbance {kind}, {', '.join(law)}", flush=True)
-            readings.append(name)
-    tool = jax.jit(jax.vmap(lambda q: kinematics.forward_kinematics(arm, q)[:3, 3]))
-    thin = task.reference.q[:-1][::THIN]
+            add(" ".join((side, kind, *law)).replace(" ", "_"), config, (side, kind, law))
+        for option, value in SENSITIVITY if whole and law == BASE[2] else ():
+            name = f"choice_{option}_{value:g}"
+            add(name, dataclasses.replace(config, **{option: value}, oracle=False), BASE)
+            readings[name]["choice"] = [option, value, getattr(config, option)]
+    tool = _tool(arm, task.reference.q[:-1][::THIN])
     t = np.asarray(task.reference.t[:-1][::THIN])
-    np.savez(folder / "shared.npz", t=t, q=np.asarray(thin), tool=np.asarray(tool(thin)))
+    np.savez(folder / "shared.npz", t=t, tool=np.asarray(tool))
     return {
-        "config": config.said(), "robot": study.name, "joints": list(arm.joint_names), "motion": task.motion,
-        "gain": np.asarray(task.gain).tolist(), "peak_torque": task.peak.tolist(), "readings": readings,
+        "made": made(config.said()), "config": config.said(), "robot": study.name, "joints": list(arm.joint_names),
+        "motion": task.motion, "gain": np.asarray(task.settings(config)["gain"]).tolist(),
+        "peak_torque": task.peak.tolist(), "readings": readings,
     }  # fmt: skip
 
 
@@ -242,12 +277,17 @@ def _reading(config: Config, task: Task, compiled, sets: dict, reading: tuple[st
     (side, kind, law), none = reading, np.zeros(task.arm.n)
     push, share = (config.share * task.peak, none) if kind == "of peak" else (none, none + config.share)
     args = lanes(sets, side, task.arm, push, share)
-    measures, traces = jax.block_until_ready(compiled(args))
+    measures, traces = jax.block_until_ready(compiled(args, task.settings(config)))
     by = lambda x: np.asarray(x).reshape(len(MODELS), config.seeds, 2, *x.shape[1:])  # noqa: E731
     store = {f"measure_{key}": by(value) for key, value in measures.items()}
-    apart = by(traces["tau"]) - by(traces["tau"])[:1]
-    store["measure_torque_apart"] = np.sqrt(np.mean(apart**2, axis=-2))
-    store |= {f"trace_{key}": by(value)[:, 0] for key, value in traces.items()}
+    tau, energy, tool = by(traces["tau"]), by(traces["energy"]).sum(axis=-1), by(traces["tool"])
+    store["measure_torque_apart"] = np.sqrt(np.mean((tau - tau[:1]) ** 2, axis=-2))
+    wanted = np.asarray(_tool(task.arm, task.reference.q[:-1][::THIN]))
+    curves = {"tau": tau, "tau_apart": tau - tau[:1], "energy": energy, "energy_apart": energy - energy[:1],
+              "miss": np.linalg.norm(tool - wanted, axis=-1)}  # fmt: skip
+    # Lowest, middle and highest of the seeds: (model, 3, condition, time, ...).
+    bands = {f"band_{key}": np.moveaxis(np.quantile(x, [0.0, 0.5, 1.0], axis=1), 0, 1) for key, x in curves.items()}
+    store |= bands | {"paths": tool[:, :, 0, ::PATHS], "trace_q": by(traces["q"])[:, 0]}
     if config.oracle and law[1] == "computed" and kind == "of peak":
         store["mujoco"] = np.array([
             [_apart_from_mujoco(config, task, args, (m, c), law[0], store["trace_q"][m, c]) for c in range(2)]
@@ -266,9 +306,16 @@ def _apart_from_mujoco(config: Config, task: Task, args: tuple, place: tuple[int
     return float(np.abs(theirs[::THIN] - q).max())
 
 
+@jax.jit
+def _tool(arm: Robot, q: jax.Array) -> jax.Array:
+    """Where the tool is along a motion [m], shape (T, 3)."""
+    return jax.vmap(lambda q: kinematics.forward_kinematics(arm, q)[:3, 3])(q)
+
+
 def _mark(config: Config, sets: dict, arm: Robot) -> str:
     """What a stored result depends on, in one number."""
-    digest = hashlib.sha256(repr(config.said()).encode())
+    told = {name: value for name, value in config.said().items() if name != "laws"}
+    digest = hashlib.sha256(repr(told).encode())
     for leaf in jax.tree.leaves((sets, arm)):
         digest.update(np.ascontiguousarray(leaf).tobytes())
     return digest.hexdigest()

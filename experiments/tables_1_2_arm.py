@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import tyro
 from study_arm import StudyArm, StudyConfig
+from study_provenance import made
 
 from irb140_jax import dynamics, kinematics
 from irb140_jax.robot import first_joints, irb140
@@ -118,7 +119,7 @@ def table2(result: dict) -> str:
 def main(config: Config) -> None:
     """Write tables_1_2.json and .md."""
     arm = config.arm()
-    result = {"config": config.said()} | run(arm)
+    result = {"made": made(config.said()), "config": config.said()} | run(arm)
     folder = config.folder(arm)
     (folder / "tables_1_2.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     text = f"# {arm.name}\n\n## Table 1\n\n{table1(result)}\n\n## Table 2\n\n{table2(result)}\n"

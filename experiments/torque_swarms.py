@@ -20,6 +20,7 @@ import numpy as np
 import tyro
 from jaxtyping import Array, Float
 from study_arm import StudyArm, StudyConfig
+from study_provenance import made
 from study_readings import SEEDS, Reading, rule
 
 from irb140_jax import identify, swarm
@@ -239,7 +240,7 @@ def main(config: Config) -> None:
     set_up_compilation_cache()
     config = dataclasses.replace(config, seeds=2) if config.smoke else config
     study = config.arm()
-    result = {"config": config.said(), "arm": study.name} | run(config, study)
+    result = {"made": made(config.said()), "config": config.said(), "arm": study.name} | run(config, study)
     folder = config.folder(study)
     (folder / "torque_swarms.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     (folder / "torque_swarms.md").write_text(page(result), encoding="utf-8")

@@ -23,6 +23,7 @@ import numpy as np
 import tyro
 from jaxtyping import Array, Float
 from study_arm import StudyArm, StudyConfig
+from study_provenance import made
 from study_readings import ITERATIONS, PARTICLES, Reading, rule
 from tracking_report import figure, page
 
@@ -239,7 +240,7 @@ def main(config: Config) -> None:
     config = dataclasses.replace(config, seeds=2, duration=0.2) if config.smoke else config
     study = config.arm()
     folder = config.folder(study)
-    result = {"config": config.said()} | run(config, study)
+    result = {"made": made(config.said()), "config": config.said()} | run(config, study)
     (folder / "tracking_swarms.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     (folder / "tracking_swarms.md").write_text(page(result), encoding="utf-8")
     figure(result, config.figure_folder(study) / "figure_tracking.svg")

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.experimental import multihost_utils
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import PyTree
 
@@ -25,22 +26,33 @@ def sweep(one: Callable[..., PyTree], lanes: PyTree, *common: Any, mesh: Mesh | 
         one: Of one lane and what all share; keep the same function between calls.
         lanes: A pytree of arrays (or keys), lanes along their first axis.
         common: What all lanes share; arrays, and settings which are part of the program.
-        mesh: Devices to share the lanes among, along the mesh's first axis; default the one device there is.
+        mesh: Devices to share the lanes among, along the mesh's first axis; default the one device there is.  Where
+            they can't share evenly, the last lane is computed some more times, and left out of the results.
 
     Returns:
-        The results, lanes along the first axis; with a mesh they stay where they were computed.
+        The results, lanes along the first axis; with a mesh they stay where they were computed, unless its devices
+        can't share them evenly.
 
     Raises:
-        InputError: Lanes of different numbers, or a number that the devices can't share evenly.
+        InputError: Lanes of different numbers, or none.
     """
     count = _count(lanes)
     if mesh is None:
         return _sweep(one, lanes, common)
     axis, devices = mesh.axis_names[0], mesh.devices.shape[0]
-    if count % devices:
-        raise InputError(f"{count} lanes on {devices} devices: give a multiple of {devices} lanes, or another mesh")
-    shared = _placed(lanes, NamedSharding(mesh, PartitionSpec(axis)))
-    return _sweep_on(mesh, axis, one, shared, _placed(common, NamedSharding(mesh, PartitionSpec())))
+    spare = -count % devices
+    shared = _placed(_padded(lanes, spare), NamedSharding(mesh, PartitionSpec(axis)))
+    found = _sweep_on(mesh, axis, one, shared, _placed(common, NamedSharding(mesh, PartitionSpec())))
+    # An array that devices share evenly can't be cut unevenly where it is: each process takes a whole copy.
+    whole = lambda x: jnp.asarray(multihost_utils.process_allgather(x, tiled=True)[:count])  # noqa: E731
+    return jax.tree.map(whole, found) if spare else found
+
+
+def _padded(lanes: PyTree, spare: int) -> PyTree:
+    """The lanes, the last one so many times more."""
+    if not spare:
+        return lanes
+    return jax.tree.map(lambda x: jnp.concatenate([x, jnp.repeat(x[-1:], spare, axis=0)]), lanes)
 
 
 def _count(lanes: PyTree) -> int:

@@ -1,4 +1,7 @@
 """The control part of the study in smoke mode: it runs, agrees with MuJoCo, and goes on where it stopped."""
+# pandas types every column as all that it might be.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
 
 import dataclasses
 import json
@@ -6,10 +9,13 @@ import pathlib
 import sys
 
 import numpy as np
+import pandas as pd
 import pytest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "experiments"))
 
+import study_provenance  # noqa: E402
+import study_statistics  # noqa: E402
 import table4_control  # noqa: E402
 import table4_report  # noqa: E402
 
@@ -42,9 +48,7 @@ def test_every_reading_is_stored_and_every_table_and_figure_written(study):
 
 def test_our_loop_is_mujocos_in_every_reading_that_was_run_beside_it(study):
     _, result, paths = study
-    table = json.loads(paths[0].read_text())["table"]
-    differences = [told["largest difference from MuJoCo [rad]"] for name, told in table.items() if "of_peak" in name
-                   and "computed" in name]  # fmt: skip
+    differences = json.loads(paths[0].read_text())["mujoco"].values()
     assert len(differences) == 3 and max(differences) < 1e-6
 
 
@@ -63,9 +67,10 @@ def test_a_second_run_computes_nothing_anew_unless_something_changed(study):
 
 def test_matched_model_of_the_reference_tracks_better_than_a_wrong_one(study):
     _, _, paths = study
-    values = table4_report.measures_of(paths[0].parent / "table4_runs" / f"{table4_report.SHOWN}.npz")
-    tracking = np.linalg.norm(values["tracking"][:, :, 0], axis=-1).mean(axis=1)
-    assert tracking[0] < tracking[1]
+    told = pd.read_parquet(paths[0].parent / table4_report.FILE)
+    mine = told[(told["reading"] == "controller_of_peak_saturation_computed") & (told["condition"] == "nominal")]
+    tracking = mine.groupby("model")["tracking"].mean()
+    assert tracking["reference"] < tracking["PSO"]
 
 
 def test_the_identified_link_carries_the_rest_of_the_arm_as_the_true_one_does(study):
@@ -92,9 +97,16 @@ def test_without_sets_or_with_those_of_another_arm_it_says_what_to_run(study, tm
         table4_control.identified(config, table4_control.Config(joints=6).arm())
 
 
-def test_a_difference_beyond_luck_is_told_and_chance_is_not():
+def test_a_difference_beyond_luck_is_told_and_chance_is_not(tmp_path):
     rng = np.random.default_rng(0)
-    low, high = rng.normal(size=30), rng.normal(size=30) + 3.0
-    rows = [table4_report.smaller("", *pair) for pair in ((low, high), (high, low), (low, low + 1e-3))]
-    table4_report.give_verdicts({"a": rows})
-    assert [row["holds"] for row in rows] == ["yes", "no, the opposite", "no difference"]
+    values = {"low": rng.normal(size=30), "high": rng.normal(size=30) + 3.0}
+    values["near"] = values["low"] + 1e-3
+    frame = pd.DataFrame({"which": np.repeat(list(values), 30), "x": np.concatenate([*values.values()])})
+    study_provenance.store(frame, tmp_path / "runs.parquet")
+    pairs = (("low", "high"), ("high", "low"), ("low", "near"))
+    tests = [study_statistics.Test("control", "", "runs.parquet", "x", *((("which", w),) for w in p)) for p in pairs]
+    assert [row["lower"] for row in study_statistics.tested(tests, tmp_path)] == ["first", "second", "neither"]
+
+
+def test_holms_correction_is_the_textbooks():
+    assert study_statistics.holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])

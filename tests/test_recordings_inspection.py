@@ -173,6 +173,11 @@ def test_joints_without_columns_are_named(sound, robot, tmp_path):
     assert "No torque or current is found for elbow" in doubts(look_at(tmp_path, table, robot))
 
 
+def test_columns_that_name_joints_only_are_said(sound, tmp_path):
+    table = {"t": sound.t} | {f"Joint_{n}": sound.q[:, n - 1] for n in (1, 2, 3)}
+    assert '"q.*" = "Joint_{n}"' in doubts(look_at(tmp_path, table))
+
+
 def test_milliseconds_are_told_by_their_step(sound, tmp_path):
     look = look_at(tmp_path, log(sound) | {"t": 1000 * sound.t})
     assert look.time_unit == "ms" and 't = "ms"' in look.map and look.refusal == ""

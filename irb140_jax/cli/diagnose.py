@@ -85,10 +85,12 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
 
     def _diagnosed(self) -> "Result":
         from irb140_jax.recordings import read_recording
+        from irb140_jax.robot import irb140_path, movable_joints
 
         hold = held_positions(self.hold)
         robot = recorded_robot(self.robot, self.recordings, self.columns, hold, self.fix_base)
-        recordings = [read_recording(path, robot, columns=self.columns) for path in self.recordings]
+        known = movable_joints(self.robot or irb140_path())
+        recordings = [read_recording(path, robot, self.columns, known_joints=known) for path in self.recordings]
         return diagnosed(robot, recordings, self.inertial_uncertainty, self._words())
 
     def _words(self) -> tuple[str, ...]:

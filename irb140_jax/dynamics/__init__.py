@@ -3,6 +3,7 @@
 from irb140_jax.dynamics.base_parameters import BaseParameters as BaseParameters
 from irb140_jax.dynamics.base_parameters import base_parameters as base_parameters
 from irb140_jax.dynamics.batch import inverse_dynamics_batch as inverse_dynamics_batch
+from irb140_jax.dynamics.c_source import c_source as c_source
 from irb140_jax.dynamics.coriolis import christoffel_symbols as christoffel_symbols
 from irb140_jax.dynamics.coriolis import coriolis_matrix as coriolis_matrix
 from irb140_jax.dynamics.energy import kinetic_energy as kinetic_energy

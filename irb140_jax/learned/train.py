@@ -24,7 +24,7 @@ class Settings(NamedTuple):
         rate: Rate at the start; the study's.
         warm_up: Share of the epochs over which the rate first rises to that, which the text does not name.  Deep
             networks of sigmoids whose first steps are as long as later ones often get stuck.
-        optimiser: "adam", or "sgd" with momentum 0.9.
+        optimiser: "adam", or "sgd" with momentum 0.9, both with clipped steps; or "plain" gradient descent.
         patience: Share of the epochs without improvement after which the rate is halved beyond that.  A rate of 0.01
             makes validation noisy; halved at the first pause it is spent before the network has learnt much.
         stop: Share of the epochs without improvement after which training ends.
@@ -35,7 +35,7 @@ class Settings(NamedTuple):
     batch: int = 250
     rate: float = 0.01
     warm_up: float = 0.0
-    optimiser: Literal["adam", "sgd"] = "adam"
+    optimiser: Literal["adam", "sgd", "plain"] = "adam"
     patience: float = 0.125
     stop: float = 0.33
     improvement: float = 1e-3
@@ -174,6 +174,8 @@ def _batches(key: Key[Array, ""], count: int, batch: int) -> Int[Array, "steps b
 
 def _optimiser(settings: Settings) -> optax.GradientTransformation:
     """Directions of unit rate; the rate itself changes with the epochs."""
+    if settings.optimiser == "plain":
+        return optax.identity()
     adam, momentum = optax.scale_by_adam(), optax.trace(decay=0.9)
     # Near a singular pose a single batch may have a slope that undoes all before it.
     return optax.chain(optax.clip_by_global_norm(1.0), adam if settings.optimiser == "adam" else momentum)

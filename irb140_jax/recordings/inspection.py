@@ -6,6 +6,7 @@
 
 import dataclasses
 import pathlib
+import re
 import tempfile
 
 import numpy as np
@@ -29,6 +30,7 @@ from irb140_jax.recordings.torques import nominal_torques
 from irb140_jax.recordings.units import UNITS
 from irb140_jax.robot import Robot
 
+NUMBER = re.compile(r"\d+")
 ORDER = ("q", "qd", "qdd", "tau", "qdes")
 SHORT = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 
@@ -120,7 +122,7 @@ def inspect_recording(
     likely, more = likely_units(t, {name: numbers[of[0].column] for name, of in meanings.items()},
                                 {name: of[0].unit for name, of in meanings.items()}, robot)  # fmt: skip
     seen = tuple(_channel(name, of, numbers, likely[name], t) for name, of in meanings.items())
-    doubts += more + _missing(meanings, joints)
+    doubts += more + _missing(meanings, joints) + _without_quantity(numbers, joints, meanings)
     draft = drafted_map(path.name, time, unit, {c.name: c for c in seen}, joints, given)
     refusal, read_notes = _tried(path, robot, columns, draft, meanings)
     used = {time, *(c.column for c in seen), *(other for c in seen for other in c.others)}
@@ -232,6 +234,15 @@ def _missing(meanings: dict, joints: tuple[str, ...]) -> list[str]:
     says = [f"No position is found for {', '.join(lost)}"] if lost else []
     no_torque = [name[2:] for name in meanings if name.startswith("q.") and f"tau.{name[2:]}" not in meanings]
     return says + ([f"No torque or current is found for {', '.join(no_torque)}"] if no_torque else [])
+
+
+def _without_quantity(numbers: dict[str, np.ndarray], joints: tuple[str, ...], meanings: dict) -> list[str]:
+    """Columns that name a joint and nothing else, as where each quantity has a file of its own."""
+    if any(name.startswith("q.") for name in meanings):
+        return []
+    bare = [name for name in numbers if name in joints or re.fullmatch(r"(?i)(joint|axis|j|a|motor)?[ _.]*\d+", name)]
+    return [f"Columns {', '.join(bare[:8])} name joints and no quantity: say in [columns] what they are, as in "
+            f"\"q.*\" = \"{NUMBER.sub('{n}', bare[0])}\""] if bare else []  # fmt: skip
 
 
 def _tried(

@@ -45,7 +45,7 @@ def _refuse_halves(path: Path, columns: Path | None, known: tuple[str, ...], joi
     silent = tuple(name for name in known if name not in joints and f"q.{name}" in table)
     if silent:
         raise RecordingError(f"{path}: missing column tau.{silent[0]}, while there is q.{silent[0]}; add it or, if the "
-                             f"joint stood still, hold it there: {_to_hold(path, columns, silent)}")
+                             f"joint stood still, hold it there: {_to_hold(path, columns, silent, known)}")
     missing = [name for name in known if name not in joints]
     for column in table:
         other = column.removeprefix("q.")
@@ -53,7 +53,8 @@ def _refuse_halves(path: Path, columns: Path | None, known: tuple[str, ...], joi
             raise RecordingError(f"{path}: holds joint '{other}', which the model has not{near}")
 
 
-def _to_hold(path: Path, columns: Path | None, silent: tuple[str, ...]) -> str:
+def _to_hold(path: Path, columns: Path | None, silent: tuple[str, ...], known: tuple[str, ...]) -> str:
     """The options that hold joints where the recording has them on average."""
-    q = unchecked_recording(pathlib.Path(path), silent, columns, torque="optional").q.mean(axis=0)
+    read = unchecked_recording(pathlib.Path(path), silent, columns, torque="optional", known_joints=known)
+    q = read.q.mean(axis=0)
     return " ".join(f"--hold {name}={value:.5g}" for name, value in zip(silent, q, strict=True))

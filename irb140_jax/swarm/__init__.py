@@ -24,3 +24,4 @@ from irb140_jax.swarm.schedule import constant as constant
 from irb140_jax.swarm.schedule import damped as damped
 from irb140_jax.swarm.schedule import linear as linear
 from irb140_jax.swarm.self_tuning import SelfTuningQpso as SelfTuningQpso
+from irb140_jax.swarm.two_attractors import TwoAttractorsQpso as TwoAttractorsQpso

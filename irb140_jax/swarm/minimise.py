@@ -69,8 +69,7 @@ def minimise(
         The minima, one a seed.
 
     Raises:
-        InputError: The box is empty or of the wrong shape, there are too few particles, iterations or seeds, or the
-            devices can't share the seeds evenly.
+        InputError: The box is empty or of the wrong shape, or there are too few particles, iterations or seeds.
     """
     lower, upper = _checked(lower, upper, particles, iterations)
     return sweep(_one_seed, keys, objective, rule, lower, upper, particles, iterations, generator, mesh=mesh)
