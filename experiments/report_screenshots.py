@@ -20,7 +20,7 @@ FLAGS = (
 )  # fmt: skip
 DARK = "--blink-settings=preferredColorScheme=0"
 PHONE = 390  # width [CSS pixels]
-HEIGHT = 4200  # of the pictures [CSS pixels]
+FIRST_SCREEN, HEIGHT = 1290, 2900  # of the pictures [CSS pixels]
 PATIENCE = 120  # [s]
 
 
@@ -63,7 +63,7 @@ def taken(report: pathlib.Path, out: pathlib.Path) -> list[pathlib.Path]:
         file = pathlib.Path(folder) / "report.html"
         file.write_text(source, encoding="utf-8")
         page = file.as_uri()
-        chromium(f"--window-size=1200,{HEIGHT}", f"--screenshot={made[0]}", page)
+        chromium(f"--window-size=1200,{FIRST_SCREEN}", f"--screenshot={made[0]}", page)
         chromium(f"--window-size=1200,{HEIGHT}", DARK, f"--screenshot={made[1]}", page)
         chromium(f"--window-size={PHONE},{HEIGHT}", f"--screenshot={made[2]}", phone.as_uri())
         chromium("--no-pdf-header-footer", f"--print-to-pdf={made[3]}", page)

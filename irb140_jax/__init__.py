@@ -26,15 +26,28 @@ if TYPE_CHECKING:
     from irb140_jax import robot as robot
     from irb140_jax import simulate as simulate
     from irb140_jax import swarm as swarm
+    from irb140_jax.library import Diagnosis as Diagnosis
+    from irb140_jax.library import diagnose as diagnose
+    from irb140_jax.library import read_recording as read_recording
     from irb140_jax.mismatch import load_corrected as load_corrected
+    from irb140_jax.recordings import Recording as Recording
+    from irb140_jax.recordings.excite import fourier_motion as fourier_motion
     from irb140_jax.robot import Robot as Robot
+    from irb140_jax.robot import irb140 as irb140
     from irb140_jax.robot import load_robot as load_robot
+    from irb140_jax.trajectory import Trajectory as Trajectory
+
+    __version__: str
 
 _SUBPACKAGES = (
     "control", "dynamics", "effects", "identify", "kinematics", "learned", "mismatch", "oracle", "recordings", "report",
     "robot", "simulate", "swarm",
 )
-_REEXPORTED = {"Robot": "robot", "load_robot": "robot", "load_corrected": "mismatch"}
+_REEXPORTED = {
+    "Diagnosis": "library", "Recording": "recordings", "Robot": "robot", "Trajectory": "trajectory",
+    "diagnose": "library", "fourier_motion": "recordings.excite", "irb140": "robot", "load_corrected": "mismatch",
+    "load_robot": "robot", "read_recording": "library",
+}
 __all__ = [*_SUBPACKAGES, *_REEXPORTED]  # pyright: ignore[reportUnsupportedDunderAll]
 
 
@@ -44,4 +57,13 @@ def __getattr__(name: str):
         return importlib.import_module(f"irb140_jax.{name}")
     if name in _REEXPORTED:
         return getattr(importlib.import_module(f"irb140_jax.{_REEXPORTED[name]}"), name)
+    if name == "__version__":
+        from importlib import metadata
+
+        return metadata.version("irb140_jax")
     raise AttributeError(f"module 'irb140_jax' has no attribute {name!r}; it has {', '.join(__all__)}")
+
+
+def __dir__() -> list[str]:
+    """Every public name, so that TAB finds what is imported only when it is used."""
+    return sorted([*__all__, "__version__"])

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import types
+import warnings
 
 import helpers_report
 import numpy as np
@@ -300,6 +301,16 @@ def test_the_steps_of_which_the_share_is_known_are_those_that_a_diagnosis_tells(
     told = " ".join(path.read_text() for path in (MODEL.parents[1] / "irb140_jax" / "mismatch").glob("*.py"))
     for words in STEPS:
         assert re.sub(r" \(round \d\)", " (round {turn})", words) in told, words
+
+
+def test_what_a_library_warns_of_is_not_said(recording, tmp_path, stub, monkeypatch, recwarn):
+    def warned(*_, **__):
+        warnings.warn("invalid value", RuntimeWarning, stacklevel=1)
+        raise InputError("no")
+
+    monkeypatch.setattr(irb140_jax.recordings, "read_recording", warned)
+    assert cli.main(["diagnose", str(recording), "--out", str(tmp_path / "d")]) == 2
+    assert not len(recwarn)
 
 
 def test_json_is_all_that_stdout_holds(recording, tmp_path, stub, capsys):

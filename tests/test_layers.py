@@ -9,7 +9,8 @@ PACKAGE = pathlib.Path(__file__).parents[1] / "irb140_jax"
 
 # Parts on one line stand beside each other and may not import each other.
 LAYERS = (
-    ("types", "errors", "allocator", "compilation_cache", "compiler"),
+    ("types", "errors", "allocator", "compilation_cache", "compiler", "tables"),
+    ("shapes",),
     ("sharding",),
     ("robot",),
     ("trajectory",),
@@ -21,7 +22,7 @@ LAYERS = (
     ("recordings",),
     ("mismatch",),
     ("report",),
-    ("cli",),
+    ("cli", "library"),
     ("__main__",),
 )
 LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}

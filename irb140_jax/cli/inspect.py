@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Inspect:
-    """Look at recordings of any format: channels, likely units, doubts; write a column map to start from."""
+    """Say what recordings hold, in which units; write a column map."""
 
     EXAMPLES: ClassVar = """\
 irb140 inspect log.csv                                                what is in it, in which units

@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 
 from irb140_jax.allocator import keep_memory
@@ -47,7 +48,10 @@ def _run(argv: Sequence[str] | None) -> None:
         from irb140_jax.compilation_cache import set_up_compilation_cache
 
         set_up_compilation_cache()
-        command.run()
+        with warnings.catch_warnings():
+            if not sys.warnoptions:  # nobody asked for them with python -W
+                warnings.simplefilter("ignore")  # what odd numbers make a library say: checks say it in our words
+            command.run()
     finally:
         sys.stdout.flush()  # here, where a pipe that nobody reads is an exception; at Python's end it is a complaint
 

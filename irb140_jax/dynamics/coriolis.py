@@ -31,6 +31,7 @@ from irb140_jax.dynamics.composite import (
 )
 from irb140_jax.kinematics import cross
 from irb140_jax.robot import Robot
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import JointMatrix, Joints
 
 
@@ -50,6 +51,7 @@ class Rates(NamedTuple):
     moment: Float[Array, "n 3 3"]
 
 
+@shape_checked
 def coriolis_matrix(robot: Robot, q: Joints, qd: Joints) -> JointMatrix:
     """Coriolis matrix by Christoffel symbols, C_ij = sum_k 1/2 (d_k M_ij + d_j M_ik - d_i M_jk) qd_k.
 
@@ -100,6 +102,7 @@ def _rates(robot: Robot, links: Links, qd: Joints) -> Rates:
     )
 
 
+@shape_checked
 def christoffel_symbols(robot: Robot, q: Joints) -> Float[Array, "n n n"]:
     """Christoffel symbols of the first kind, c_ijk = 1/2 (d_k M_ij + d_j M_ik - d_i M_jk).
 

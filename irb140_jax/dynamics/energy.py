@@ -5,9 +5,11 @@ import jax.numpy as jnp
 from irb140_jax.dynamics.composite import placed_links
 from irb140_jax.dynamics.mass import mass_matrix
 from irb140_jax.robot import Robot
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import Joints, Scalar
 
 
+@shape_checked
 def kinetic_energy(robot: Robot, q: Joints, qd: Joints) -> Scalar:
     """Kinetic energy T = 1/2 qd^T M(q) qd, rotors included.
 
@@ -22,6 +24,7 @@ def kinetic_energy(robot: Robot, q: Joints, qd: Joints) -> Scalar:
     return 0.5 * qd @ mass_matrix(robot, q) @ qd
 
 
+@shape_checked
 def potential_energy(robot: Robot, q: Joints) -> Scalar:
     """Potential energy of gravity, V = -sum_i m_i g0 . c_i, zero at the base's origin; springs are not in it.
 

@@ -9,9 +9,11 @@ from irb140_jax.dynamics.newton_euler import rigid_torque
 from irb140_jax.dynamics.passive import passive_torque
 from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.robot import Robot
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import Joints
 
 
+@shape_checked
 def forward_dynamics(robot: Robot, q: Joints, qd: Joints, tau: Joints) -> Joints:
     """Joint accelerations, qdd = M(q)^-1 (tau - C(q, qd) qd - g(q) - passive).
 

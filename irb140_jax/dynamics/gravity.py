@@ -5,9 +5,11 @@ import jax.numpy as jnp
 from irb140_jax.dynamics.composite import composite, placed_links
 from irb140_jax.kinematics import cross
 from irb140_jax.robot import Robot
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import Joints
 
 
+@shape_checked
 def gravity_torque(robot: Robot, q: Joints) -> Joints:
     """Gravity torque g(q) = -sum_i Jv_i^T m_i g0, the gradient of the potential energy.
 

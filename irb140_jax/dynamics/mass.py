@@ -4,9 +4,11 @@ import jax.numpy as jnp
 
 from irb140_jax.dynamics.composite import by_order, composite, momenta, pairs, placed_links
 from irb140_jax.robot import Robot
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import JointMatrix, Joints
 
 
+@shape_checked
 def mass_matrix(robot: Robot, q: Joints) -> JointMatrix:
     """Mass matrix M(q) = sum_i m_i Jv_i^T Jv_i + Jw_i^T I_i Jw_i, plus the rotors' armature on the diagonal.
 

@@ -27,6 +27,7 @@ from irb140_jax.dynamics.scalars import (
 from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.dynamics.trig import sincos
 from irb140_jax.robot import Robot
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import Joints
 
 Wrench = tuple[Vector, Vector]
@@ -135,6 +136,7 @@ def _carried_wrench(link: Link, motion: Motion, outer: list[tuple[Placement, Wre
     return force, moment
 
 
+@shape_checked
 def inverse_dynamics(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Joints:
     """Joint torques of a motion, tau = M(q) qdd + C(q, qd) qd + g(q) + passive, M with armature.
 

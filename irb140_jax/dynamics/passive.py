@@ -3,9 +3,11 @@
 import jax.numpy as jnp
 
 from irb140_jax.robot import Robot
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import Joints
 
 
+@shape_checked
 def passive_torque(robot: Robot, q: Joints, qd: Joints) -> Joints:
     """Torque a drive spends on the model's own friction and springs, d qd + f sign(qd) + k (q - q0).
 

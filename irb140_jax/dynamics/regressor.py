@@ -14,12 +14,14 @@ from irb140_jax.dynamics.scalars import ZERO, Number, Vector, add, cross, dot, i
 from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.robot import Robot
 from irb140_jax.robot.tree import path
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import Joints, JointSamples
 
 # Unit motions of joints: angular, and linear at a frame's origin.
 Screw = tuple[Vector, Vector]
 
 
+@shape_checked
 def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, "n k"]:
     """Matrix Y of the rigid bodies' torques, Y phi + armature qdd + passive = inverse dynamics.
 
@@ -38,6 +40,7 @@ def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, 
     return _regressor(robot, plan(robot, regrouped=False), q, qd, qdd)
 
 
+@shape_checked
 def regressor_batch(robot: Robot, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> Float[Array, "T n k"]:
     """`regressor` of T samples, arrays of shape (T, n) -> (T, n, 10 n)."""
     return in_chunks(_regressor_of_chunk, (robot, plan(robot, regrouped=False)), (q, qd, qdd))

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from irb140_jax.robot import Robot
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import Joints, Mat3, Pose, Scalar, Vec3
 
 
@@ -62,6 +63,7 @@ def link_frames(robot: Robot, q: Joints) -> tuple[Float[Array, "n 3 3"], Float[A
     return jnp.stack(rotations[1:]), jnp.stack(origins[1:])
 
 
+@shape_checked
 def link_poses(robot: Robot, q: Joints) -> Float[Array, "n 4 4"]:
     """Pose of every link's frame in the world, T_world_link.
 
@@ -77,6 +79,7 @@ def link_poses(robot: Robot, q: Joints) -> Float[Array, "n 4 4"]:
     return jnp.stack([T_world_base @ pose(rotations[i], origins[i]) for i in range(robot.n)])
 
 
+@shape_checked
 def forward_kinematics(robot: Robot, q: Joints) -> Pose:
     """Pose of the tool in the world, T_world_tool = T_world_base T_base_n T_n_tool.
 

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from irb140_jax.kinematics.forward import link_frames
 from irb140_jax.robot import Robot
 from irb140_jax.robot.tree import moves
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import Joints
 
 
@@ -32,6 +33,7 @@ class LinkJacobians(NamedTuple):
     centre: Float[Array, "n 3"]
 
 
+@shape_checked
 def jacobian(robot: Robot, q: Joints) -> Float[Array, "6 n"]:
     """Geometric Jacobian of the tool in world axes, [v; w] = J(q) qd.
 

@@ -9,9 +9,11 @@ from jaxtyping import Array, Float
 from irb140_jax.kinematics.forward import forward_kinematics
 from irb140_jax.kinematics.jacobian import jacobian
 from irb140_jax.robot import Robot
+from irb140_jax.shapes import shape_checked
 from irb140_jax.types import Joints, Scalar
 
 
+@shape_checked
 def singular_values(robot: Robot, q: Joints) -> Float[Array, " k"]:
     """Singular values of the geometric Jacobian, largest first.
 
@@ -25,6 +27,7 @@ def singular_values(robot: Robot, q: Joints) -> Float[Array, " k"]:
     return jnp.linalg.svd(jacobian(robot, q), compute_uv=False)
 
 
+@shape_checked
 def condition_number(robot: Robot, q: Joints) -> Scalar:
     """Condition number of the Jacobian in the 2-norm, kappa = ||J|| ||J^-1|| = s_max / s_min.
 

@@ -21,13 +21,13 @@ def verdict(
     """The contract's verdict.
 
     `unexplained` where nothing is named, or where more is left unnamed than was named.  `undecided` where nothing is
-    named and a joint can't be told of, or where that is so of most joints, whatever is named.
+    named and a joint can't be told of; beside names that is a note.
     """
     nominal, corrected = (proof.rmse(x) for x in (proof.nominal, proof.corrected))
     named = np.sqrt(np.clip(nominal**2 - corrected**2, 0.0, None))
     if any(not found or u.rms > named[u.joint] for u in rest):
         return "unexplained"
-    if open_ and (not found or 2 * len(open_) > proof.judged.sum()):
+    if open_ and not found:
         return "undecided"
     if found:
         return "physics_left_out"

@@ -10,6 +10,7 @@ import pandas as pd
 from jaxtyping import Bool, Float
 
 from irb140_jax.errors import RecordingError
+from irb140_jax.tables import table_html
 
 WRITABLE = (".csv", ".parquet", ".npz")
 
@@ -53,6 +54,15 @@ class Recording:
             if value is not None and value.shape != shape:
                 raise RecordingError(f"{self.source}: {name} has shape {value.shape}; allowed is (T, n) = {shape}, one "
                                      "row a sample and one column a joint")
+
+    def _repr_html_(self) -> str:
+        """Ranges of the joints as a table, for notebooks."""
+        span = lambda x: f"{np.min(x):.4g} to {np.max(x):.4g}"  # noqa: E731
+        rows = [(name, span(self.q[:, j]), span(self.tau[:, j]) if self.has_torque else "none")
+                for j, name in enumerate(self.joint_names)]  # fmt: skip
+        duration = float(self.t[-1] - self.t[0]) if len(self.t) else 0.0
+        said = f"{self.source}: {len(self.t)} rows, {duration:.4g} s. {' '.join(self.notes)}"
+        return table_html(("joint", "position [rad or m]", "torque [N m or N]"), rows, said)
 
     @property
     def has_torque(self) -> bool:

@@ -3,10 +3,12 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from irb140_jax.errors import RobotError
 from irb140_jax.robot.tree import Parents, is_depth_first, serial
+from irb140_jax.tables import table_html
 from irb140_jax.types import Inertials, Joints, Mat3, Vec3
 
 _PER_JOINT = (
@@ -123,6 +125,16 @@ class Robot(eqx.Module):
     def is_chain(self) -> bool:
         """Whether nothing branches: each link sits on the one before."""
         return self.parent == serial(self.n)
+
+    def _repr_html_(self) -> str:
+        """The joints as a table, for notebooks."""
+        columns = (self.lower, self.upper, self.velocity_limit, self.effort_limit, self.mass)
+        if any(not eqx.is_array(column) or isinstance(column, Tracer) or jnp.ndim(column) != 1 for column in columns):
+            return table_html(("joint",), [(name,) for name in self.joint_names], f"{self.name}, batched or traced")
+        kinds = ["slide" if slide else "hinge" for slide in self.is_slide]
+        numbers = ([f"{float(x):.4g}" for x in column] for column in columns)
+        heads = ("joint", "kind", "from", "to", "speed limit", "torque limit", "mass behind it [kg]")
+        return table_html(heads, zip(self.joint_names, kinds, *numbers, strict=True), f"{self.name}, SI units")
 
     @property
     def phi(self) -> Inertials:

@@ -6,7 +6,7 @@ takes several at a time, and 27 unknowns would leave a remainder.
 """
 
 import abc
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -36,6 +36,8 @@ class Clock(NamedTuple):
         """Share of the iterations done, t/T."""
         return jnp.asarray(self.iteration, float) / self.iterations
 
+S = TypeVar("S", bound="Swarm")  # typing.Self would stop the check of shapes at import
+
 
 class Swarm(eqx.Module):
     """State of one swarm of p particles with k coordinates each, searching d unknowns (k = d unless it is coded).
@@ -62,11 +64,11 @@ class Swarm(eqx.Module):
     stalled: Int[Array, ""]
     memory: Any = None
 
-    def at(self, position: Float[Array, "k p"], velocity: Float[Array, "k p"], **changes: Any) -> Self:
+    def at(self: S, position: Float[Array, "k p"], velocity: Float[Array, "k p"], **changes: Any) -> S:
         """The swarm moved there."""
         return self.with_(position=position, velocity=velocity, **changes)
 
-    def with_(self, **changes: Any) -> Self:
+    def with_(self: S, **changes: Any) -> S:
         """The swarm with these attributes changed."""
         names = tuple(changes)
         where = lambda swarm: [getattr(swarm, name) for name in names]  # noqa: E731

@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, TypeVar
 
 import mujoco
 import numpy as np
@@ -96,6 +96,8 @@ class Survey(NamedTuple):
         """Whether the joint is prismatic."""
         return bool(self.model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE)
 
+H = TypeVar("H", bound="Hidden")  # typing.Self would stop the check of shapes at import
+
 
 class Hidden:
     """A kind of hidden physics on given joints, with given parameters.
@@ -119,7 +121,7 @@ class Hidden:
         self.joint = self.joints[0]
 
     @classmethod
-    def drawn(cls, joints: Sequence[int], share: float, survey: Survey, rng: np.random.Generator) -> Self:
+    def drawn(cls: type[H], joints: Sequence[int], share: float, survey: Survey, rng: np.random.Generator) -> H:
         """An instance with shapes drawn at random and amplitudes that give the wanted share.
 
         Args:
