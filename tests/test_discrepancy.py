@@ -10,9 +10,9 @@ from irb140_jax.recordings.condition import Conditioned
 RATE = 200.0
 T = np.arange(0.0, 20.0, 1.0 / RATE)
 WAVES = ((0.9, 0.31, 0.2), (0.4, 0.83, 1.1), (0.2, 1.37, 2.3))  # [rad], [Hz], [rad]
-Q = sum(a * np.sin(2 * np.pi * f * T + p) for a, f, p in WAVES)
-QD = sum(a * 2 * np.pi * f * np.cos(2 * np.pi * f * T + p) for a, f, p in WAVES)
-QDD = sum(-a * (2 * np.pi * f) ** 2 * np.sin(2 * np.pi * f * T + p) for a, f, p in WAVES)
+Q = np.sum([a * np.sin(2 * np.pi * f * T + p) for a, f, p in WAVES], axis=0)
+QD = np.sum([a * 2 * np.pi * f * np.cos(2 * np.pi * f * T + p) for a, f, p in WAVES], axis=0)
+QDD = np.sum([-a * (2 * np.pi * f) ** 2 * np.sin(2 * np.pi * f * T + p) for a, f, p in WAVES], axis=0)
 LOAD = 5.0 * np.cos(Q) + 0.3 * QDD
 SIGN = np.tanh(QD / 0.01)
 
