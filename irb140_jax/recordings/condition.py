@@ -45,7 +45,8 @@ class Conditioned:
         began: Time of the log's first row [s]; the smoother leaves out the first samples.
         motion: Number of the motion, the same for recordings of one programme; -1: its own.
         repeats: How many recordings there are of that motion.
-        shaken: Standard deviation of what encoder noise leaves in qdd [rad/s^2 or m/s^2], shape (n,).
+        shaken: Standard deviation of what encoder noise leaves in qdd in the band of the comparison [rad/s^2 or
+            m/s^2], shape (n,).
     """
 
     source: str
@@ -178,7 +179,8 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     unsure = _between(tau, band, raw_rate)
     anti_alias = kernels(min(0.4 * band.rate, 0.45 * raw_rate), raw_rate)[0]
     white = white_density(recording, raw_rate)
-    q, (speed_noise, shaken) = without_noise(q, white, raw_rate, (h1, h2), resampled=t is not recording.t)
+    compared = np.convolve(h2, kernels(min(band.torque, 0.45 * raw_rate), raw_rate)[0])  # as accelerations are
+    q, (speed_noise, shaken) = without_noise(q, white, raw_rate, (h1, compared), resampled=t is not recording.t)
     smoothed = [convolved(q, k) for k in (h, h1, h2)]
     tau = filtered(tau, anti_alias)
     keep = slice(None) if pad else slice(half, len(t) - half)
