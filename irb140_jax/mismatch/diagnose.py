@@ -109,7 +109,7 @@ def _diagnosed(
     robot: Robot, recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None]
 ) -> Result:
     moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
-    recordings = [with_lost_torque_marked(_finite(r), moves) for r in recordings]
+    recordings = [with_lost_torque_marked(_finite(r), moves, robot) for r in recordings]
     recordings, twice = without_copies(recordings)
     progress("smoothing and differentiating the positions")
     band = choose_band(list(recordings), robot)

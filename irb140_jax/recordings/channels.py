@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from irb140_jax.recordings.glance import Glance
+from irb140_jax.recordings.glance import ENDS, Glance, glance
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.repair import longest_run
 from irb140_jax.recordings.torques import Torques, nominal_torques
@@ -21,6 +21,7 @@ from irb140_jax.robot import Robot
 FROZEN = 0.5  # s that a torque must hold one value while its joint moves
 FROZEN_RUNS = 10.0  # times as long as it holds any other value: a coarse sensor repeats itself more evenly
 MOVED = 0.05  # of the joint's travel that it must move meanwhile
+OFF = 0.5  # of the torque that a joint needs elsewhere: with less, it moves with its drive off
 WELL, BADLY = 0.9, 0.6  # shares of a torque's variance that the model explains under a true hypothesis, and as given
 BETTER = 5.0  # times less that is left unexplained under a true hypothesis
 SURE = 0.97  # share that suffices on two joints at least, however well the model as given explains
@@ -54,12 +55,13 @@ class Doubt(NamedTuple):
 # --- dead and frozen torque ------------------------------------------------------------------------------------------
 
 
-def with_lost_torque_marked(recording: Recording, least_travel: np.ndarray) -> Recording:
+def with_lost_torque_marked(recording: Recording, least_travel: np.ndarray, robot: Robot) -> Recording:
     """The recording with the rows marked in which a torque channel is dead or frozen while its joint moves.
 
     Args:
         recording: With torque.
         least_travel: Below it, a joint counts as standing still [rad or m], shape (n,).
+        robot: The nominal model: where a drive is switched off, torque is rightly zero, and the model knows.
 
     Returns:
         The same with `torque_lost`, and a note for every channel concerned.
@@ -67,7 +69,7 @@ def with_lost_torque_marked(recording: Recording, least_travel: np.ndarray) -> R
     lost, notes = np.zeros(recording.tau.shape, dtype=bool), list(recording.notes)
     for j, name in enumerate(recording.joint_names):
         rows = _frozen(recording.t, recording.q[:, j], recording.tau[:, j], least_travel[j])
-        if not rows.any():
+        if not rows.any() or (not rows.all() and _switched_off(recording, rows, j, robot)):
             continue
         lost[rows, j] = True
         value, i = recording.tau[rows, j][0], np.flatnonzero(rows)
@@ -81,6 +83,17 @@ def with_lost_torque_marked(recording: Recording, least_travel: np.ndarray) -> R
     if not lost.any():
         return recording
     return dataclasses.replace(recording, torque_lost=lost, notes=tuple(dict.fromkeys(notes)))
+
+
+def _switched_off(recording: Recording, rows: np.ndarray, j: int, robot: Robot) -> bool:
+    """Whether the model, too, needs hardly any torque in these rows, beside what it needs in the others."""
+    seen = glance(recording)
+    needed = nominal_torques(robot, seen.q, seen.qd, seen.qdd).total[:, j]
+    t = recording.t
+    margin = min(ENDS, 0.1 * (t[-1] - t[0]))
+    inside = np.interp(np.linspace(t[0] + margin, t[-1] - margin, len(needed)), t, rows.astype(float)) > 0.5
+    rms = lambda x: float(np.sqrt(np.mean(x**2))) if len(x) else 0.0  # noqa: E731
+    return rms(needed[inside] - recording.tau[rows, j][0]) < OFF * rms(needed[~inside])
 
 
 def _frozen(t: np.ndarray, q: np.ndarray, tau: np.ndarray, least: float) -> np.ndarray:

@@ -96,7 +96,7 @@ def check_motion(recording: Recording, seen: Glance, robot: Robot) -> Recording:
                              "FILE.toml")
     moving = seen.travel > least(MOVING)
     if recording.has_torque:
-        recording = with_lost_torque_marked(recording, least(MOVING))
+        recording = with_lost_torque_marked(recording, least(MOVING), robot)
         lost = recording.torque_lost
         if lost is not None and np.all(lost.all(axis=0) | ~moving):
             raise RecordingError(f"{source}: no moving joint has a torque that changes: columns "
