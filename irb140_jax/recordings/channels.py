@@ -86,14 +86,16 @@ def with_lost_torque_marked(recording: Recording, least_travel: np.ndarray, robo
 
 
 def _switched_off(recording: Recording, rows: np.ndarray, j: int, robot: Robot) -> bool:
-    """Whether the model, too, needs hardly any torque in these rows, beside what it needs in the others."""
+    """Whether torque is zero in these rows and the model, too, needs hardly any, beside what it needs in the others."""
+    if recording.tau[rows, j][0] != 0.0:
+        return False
     seen = glance(recording)
     needed = nominal_torques(robot, seen.q, seen.qd, seen.qdd).total[:, j]
     t = recording.t
     margin = min(ENDS, 0.1 * (t[-1] - t[0]))
     inside = np.interp(np.linspace(t[0] + margin, t[-1] - margin, len(needed)), t, rows.astype(float)) > 0.5
     rms = lambda x: float(np.sqrt(np.mean(x**2))) if len(x) else 0.0  # noqa: E731
-    return rms(needed[inside] - recording.tau[rows, j][0]) < OFF * rms(needed[~inside])
+    return rms(needed[inside]) < OFF * rms(needed[~inside])
 
 
 def _frozen(t: np.ndarray, q: np.ndarray, tau: np.ndarray, least: float) -> np.ndarray:
