@@ -350,7 +350,7 @@ def test_a_joint_that_sticks_while_its_encoder_flickers_between_two_counts_is_at
 
 
 def test_what_samples_leave_open_of_a_step_is_how_far_the_low_passed_torque_is_off():
-    fine, rng = 20000.0, np.random.default_rng(0)
+    fine, rng = 4000.0, np.random.default_rng(0)
     taps, t = kernels(BAND.torque, RATE)[0], times(4.0)
     rise = np.cumsum(kernels(BAND.torque, fine)[0])
     after = (np.arange(len(rise)) - len(rise) // 2) / fine
