@@ -1,5 +1,7 @@
 """`irb140 predict`: motions with and without torque, and a table that PlotJuggler opens."""
 
+import json
+import shutil
 import xml.etree.ElementTree as ET
 
 import helpers_recordings
@@ -41,6 +43,21 @@ def test_a_motion_without_torque_gets_the_same_prediction(folder, recording, pre
     table.drop(columns=[f"tau.{joint}" for joint in JOINTS]).to_csv(tmp_path / "planned.csv", index=False)
     planned = run(folder, tmp_path / "planned.csv", tmp_path / "p.csv")
     pd.testing.assert_frame_equal(planned, predicted)
+
+
+def test_numbers_of_joints_mean_those_of_the_whole_model_where_some_were_held(
+    folder, recording, predicted, tmp_path
+):
+    held = shutil.copytree(folder, tmp_path / "held")
+    model = json.loads((held / "model.json").read_text())
+    model["known_joints"] = ["torso", *JOINTS]
+    (held / "model.json").write_text(json.dumps(model))
+    table = pd.read_csv(recording)
+    names = {f"{kind}.{joint}": f"{kind} {n}" for kind in ("q", "tau") for n, joint in enumerate(JOINTS, 2)}
+    table.rename(columns=names).to_csv(tmp_path / "numbered.csv", index=False)
+    (tmp_path / "map.toml").write_text('[columns]\n"q.*" = "q {n}"\n"tau.*" = "tau {n}"\n')
+    again = run(held, tmp_path / "numbered.csv", tmp_path / "p.csv", "--columns", str(tmp_path / "map.toml"))
+    pd.testing.assert_frame_equal(again, predicted)
 
 
 def test_the_prediction_is_mujocos_torque_of_the_model(recording, predicted):

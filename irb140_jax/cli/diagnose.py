@@ -91,7 +91,7 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
         robot = recorded_robot(self.robot, self.recordings, self.columns, hold, self.fix_base)
         known = movable_joints(self.robot or irb140_path())
         recordings = [read_recording(path, robot, self.columns, known_joints=known) for path in self.recordings]
-        return diagnosed(robot, recordings, self.inertial_uncertainty, self._words())
+        return diagnosed(robot, recordings, self.inertial_uncertainty, self._words(), known)
 
     def _words(self) -> tuple[str, ...]:
         """Options that name files or joints, as the diagnosis keeps them."""
@@ -102,13 +102,14 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
 
 
 def diagnosed(
-    robot: "Robot", recordings: list["Recording"], inertial_uncertainty: float = 0.05, words: tuple[str, ...] = ()
+    robot: "Robot", recordings: list["Recording"], inertial_uncertainty: float = 0.05, words: tuple[str, ...] = (),
+    known_joints: tuple[str, ...] = (),
 ) -> "Result":
     """The diagnosis, with its progress shown."""
     from irb140_jax.mismatch import DiagnoseConfig, diagnose
 
     with progress(STEPS) as tell:
-        config = DiagnoseConfig(inertial_uncertainty=inertial_uncertainty, words=words)
+        config = DiagnoseConfig(inertial_uncertainty=inertial_uncertainty, words=words, known_joints=known_joints)
         return diagnose(robot, recordings, config, tell)
 
 

@@ -66,7 +66,9 @@ irb140 predict d new.csv --out torque.csv --measured      beside what was measur
         from irb140_jax.recordings import read_recording
 
         model = load_model(self.folder)
-        recording = read_recording(self.recording, model.robot, columns=self.columns, torque="optional")
+        recording = read_recording(
+            self.recording, model.robot, self.columns, torque="optional", known_joints=model.known_joints
+        )
         if self.measured and not recording.has_torque:
             raise InputError(f"{self.recording}: holds no torque to compare with; leave --measured out")
         torque, joints = predict(model, recording), recording.joint_names

@@ -46,6 +46,7 @@ class DiagnoseConfig:
         effects: The library; by default every effect of the catalogue.
         words: What the command line said beside the recordings and the uncertainty, to be kept in the diagnosis:
             `--robot arm.xml`.
+        known_joints: Every joint of the model's file, where the robot is a part of it; see `CorrectedModel`.
         discrepancy: Whether laws may be wrong by a function of the state, and logs by the instrument: the second
             engine, which is being compared with the first.
     """
@@ -53,6 +54,7 @@ class DiagnoseConfig:
     inertial_uncertainty: float = 0.05
     effects: tuple[AbstractEffect, ...] = tuple(CATALOGUE.values())
     words: tuple[str, ...] = ()
+    known_joints: tuple[str, ...] = ()
     discrepancy: bool = False
 
     @property
@@ -131,7 +133,7 @@ def _diagnosed(
         ex = explained_by(ex, tuple(c for c in ex.chosen if c not in doubtful))
         refit, proof, rest = _proved(ex, progress)
     found = findings(robot, ex)
-    model = _model(robot, ex, refit, band)
+    model = _model(robot, ex, refit, band, config.known_joints or robot.joint_names)
     w = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen).mean * ex.data.scale[ex.columns()]
     logged = [s.tau for s in ex.data.stretches]
     corrected = [s.tau - s.y + s.X[..., ex.columns()] @ w for s in ex.data.stretches]
@@ -176,7 +178,7 @@ def _proved(ex: Explanation, progress: Callable[[str], None]) -> tuple[Refit, He
     return refit, proof, unexplained(ex, proof)
 
 
-def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band) -> CorrectedModel:
+def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band, known: tuple[str, ...]) -> CorrectedModel:
     loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
     refitted_shift, _, _ = fitted(ex.data, refit.posterior(), loose, ex.factor)
     post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
@@ -184,7 +186,7 @@ def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band) -> Corrected
     phi = np.asarray(robot.phi)
     named = tuple(Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True))
     phi_refit, phi_corrected = (phi + shift.reshape(phi.shape) for shift in (refitted_shift, dphi))
-    return CorrectedModel(robot, phi_refit, phi_corrected, named, band, ex.scales.rest_speed)
+    return CorrectedModel(robot, phi_refit, phi_corrected, named, band, ex.scales.rest_speed, known)
 
 
 def _document(

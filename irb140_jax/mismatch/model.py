@@ -101,6 +101,8 @@ class CorrectedModel:
         named: The effects.
         band: Of the comparison.
         rest_speed: Speed that the encoders of the recordings can't tell from rest [rad/s or m/s], shape (n,).
+        known_joints: Every joint of the model's file, in its order, of which the robot may be a part: column maps
+            number joints by it.
     """
 
     robot: Robot
@@ -109,6 +111,7 @@ class CorrectedModel:
     named: tuple[Named, ...]
     band: Band
     rest_speed: np.ndarray
+    known_joints: tuple[str, ...] = ()
 
 
 def composed(
@@ -220,6 +223,7 @@ def to_json(model: CorrectedModel) -> dict[str, Any]:
         "phi_corrected": model.phi_corrected.tolist(),
         "band": dataclasses.asdict(model.band),
         "rest_speed": model.rest_speed.tolist(),
+        "known_joints": list(model.known_joints or model.robot.joint_names),
         "effects": [
             {
                 "effect": n.effect.slug, "joints": list(n.joints), "variant": list(n.variant),
@@ -252,6 +256,7 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
         ),
         Band(**data["band"]),
         np.array(data["rest_speed"], dtype=float),
+        tuple(data.get("known_joints", robot["joint_names"])),
     )  # fmt: skip
 
 
