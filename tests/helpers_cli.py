@@ -74,7 +74,8 @@ def stub(monkeypatch):
     def load_model(folder):
         from irb140_jax.robot import load_robot
 
-        return types.SimpleNamespace(robot=load_robot(MODEL))
+        robot = load_robot(MODEL)
+        return types.SimpleNamespace(robot=robot, known_joints=robot.joint_names)
 
     for function in (diagnose, save, predict, load_model):
         monkeypatch.setattr(irb140_jax.mismatch, function.__name__, function, raising=False)
