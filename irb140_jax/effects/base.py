@@ -201,6 +201,12 @@ class AbstractEffect(abc.ABC):
         del robot, joints
         return np.full(max(max(v) for v in self.variants) + 1, np.inf)
 
+    def at_shape(self, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest amplitude of each column with which a shape means anything; by default any."""
+        del shape
+        free = np.full(max(max(v) for v in self.variants) + 1, np.inf)
+        return -free, free
+
     def likely(self, robot: Robot) -> np.ndarray:
         """Proportion in which its own columns act, shape (len(own),)."""
         del robot

@@ -53,6 +53,11 @@ class TimeDelay(AbstractEffect):
 
         return jax.vmap(mean_slope, in_axes=1, out_axes=1)(motion.asked_rate)[:, :, None]
 
+    def at_shape(self, shape):
+        # The slope is taken over the delay itself, give or take the spacing of the delays that are tried.
+        spacing = 2.0 * (HALVES[1] - HALVES[0])
+        return 2.0 * shape - spacing, 2.0 * shape + spacing
+
     def passed_on(self, x, dt, w, shape):
         t, slope = dt * np.arange(len(x)), np.gradient(x, dt, axis=0)
         at = t + shape[0] * (1.0 + NODES[:, None])

@@ -6,7 +6,7 @@ import numpy as np
 
 from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.evidence import Grams, eliminated, grams
-from irb140_jax.mismatch.noise import Noise, noise_from_residuals
+from irb140_jax.mismatch.noise import Noise, noise_from_residuals, ridge
 from irb140_jax.mismatch.problem import Problem
 from irb140_jax.mismatch.rows import Stretch
 from irb140_jax.mismatch.silent import LooseInertials
@@ -152,15 +152,7 @@ def first_noise(data: Data) -> Noise:
         y = np.concatenate([s.y[s.use[:, j], j] for s in data.stretches])
         if len(y) < 10:
             continue
-        values, vectors = np.linalg.eigh(A.T @ A)
-        values, projected = np.clip(values, 0, None), vectors.T @ (A.T @ y)
-        variance = float(np.mean(y**2)) * 0.1 + 1e-18
-        for _ in range(10):
-            w = projected / (values + variance)
-            rss = y @ y - 2 * w @ projected + (w**2) @ values
-            dof[j] = np.sum(values / (values + variance))
-            variance = max(rss, 1e-18 * (y @ y)) / max(len(y) - dof[j], 0.2 * len(y)) + 1e-24
-        v = vectors @ (projected / (values + variance))
+        v, dof[j] = ridge(A, y)
         for s, r in zip(data.stretches, residuals, strict=True):
             r[:, j] = s.y[:, j] - s.X[:, j][:, keep] @ (v * data.scale[keep])
     return noise_from_residuals(residuals, use, dof, [s.unsure for s in data.stretches])

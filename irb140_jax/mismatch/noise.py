@@ -95,6 +95,29 @@ def noise_from_residuals(
     return Noise(ar, np.maximum(level, 1e-9), np.maximum(total, 1e-9))
 
 
+def ridge(A: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
+    """Coefficients with a standard normal prior, the noise's variance found from what they leave.
+
+    Args:
+        A: Columns in units of their prior standard deviation, shape (R, K).
+        y: What they should add up to, shape (R,).
+
+    Returns:
+        Coefficients, shape (K,), and how many of them the data determine.
+
+    Source: D. J. C. MacKay, Bayesian interpolation, Neural Computation 4(3), 1992.
+    """
+    values, vectors = np.linalg.eigh(A.T @ A)
+    values, projected = np.clip(values, 0, None), vectors.T @ (A.T @ y)
+    variance, dof = float(np.mean(y**2)) * 0.1 + 1e-18, 0.0
+    for _ in range(10):
+        w = projected / (values + variance)
+        rss = y @ y - 2 * w @ projected + (w**2) @ values
+        dof = float(np.sum(values / (values + variance)))
+        variance = max(rss, 1e-18 * (y @ y)) / max(len(y) - dof, 0.2 * len(y)) + 1e-24
+    return vectors @ (projected / (values + variance)), dof
+
+
 def _size(residual: np.ndarray, unsure: np.ndarray) -> float:
     """Standard deviation of the noise in a residual that is unsure by more in some rows; 0 without rows."""
     size = whole = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0

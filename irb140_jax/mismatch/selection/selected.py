@@ -7,7 +7,7 @@ import numpy as np
 
 from irb140_jax.mismatch.assemble import Data
 from irb140_jax.mismatch.evidence import Posterior
-from irb140_jax.mismatch.noise import Noise, noise_from_residuals
+from irb140_jax.mismatch.noise import Noise, noise_from_residuals, ridge
 from irb140_jax.mismatch.regression.gram import START, own_scale
 from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON, Nuisances
 from irb140_jax.mismatch.selection.averages import Site, probabilities
@@ -122,15 +122,7 @@ def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:
         y = np.concatenate([s.y[u[:, j], j] for s, u in zip(data.stretches, use, strict=True)])
         if len(y) < 10:
             continue
-        values, vectors = np.linalg.eigh(A.T @ A)
-        values, projected = np.clip(values, 0, None), vectors.T @ (A.T @ y)
-        variance = float(np.mean(y**2)) * 0.1 + 1e-18
-        for _ in range(10):
-            w = projected / (values + variance)
-            rss = y @ y - 2 * w @ projected + (w**2) @ values
-            dof[j] = np.sum(values / (values + variance))
-            variance = max(rss, 1e-18 * (y @ y)) / max(len(y) - dof[j], 0.2 * len(y)) + 1e-24
-        v = vectors @ (projected / (values + variance))
+        v, dof[j] = ridge(A, y)
         for s, r, x in zip(data.stretches, residuals, columns, strict=True):
             r[:, j] = s.y[:, j] - x @ v
     return noise_from_residuals(residuals, use, dof, [s.unsure for s in data.stretches])

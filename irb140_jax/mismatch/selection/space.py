@@ -47,8 +47,11 @@ def space_of(data: Data, extra: Sequence[Nuisances], noise: Noise) -> Space:
         k, moves = len(c.columns), s > 0.0
         lowest[i, :k] = np.where(moves, c.lowest / np.where(moves, s, 1.0), np.where(c.lowest == 0.0, np.inf, -np.inf))
         highest[i, :k] = c.highest / np.where(moves, s, 1.0)
-        if c.slug == "time_delay" and moves.all():  # a slope over some time is a delay of about that time
-            lowest[i, 0], highest[i, 0] = (2.0 * c.shape[0] + np.array([-2e-3, 2e-3])) / s[0]
+        if moves.all():
+            least, most = c.effect.at_shape(c.shape)
+            own = list(c.variant)
+            lowest[i, :k] = np.maximum(lowest[i, :k], least[own] / s)
+            highest[i, :k] = np.minimum(highest[i, :k], most[own] / s)
     return Space(
         joint_grams(data, extra, noise), data.candidates, data.nuisances, data.nuisances + common,
         len(data.scale) + common, log_prior, lowest, highest,

@@ -1,0 +1,32 @@
+"""The whole way of a diagnosis with model discrepancy, on plants that share nothing with it."""
+
+import json
+import pathlib
+import sys
+
+from testbed import runner, scoring
+from testbed.cases import make
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "experiments"))
+import second_engine  # noqa: E402
+
+
+def said(index: int) -> dict:
+    """A case of the draw that may be looked at, as it is stored."""
+    line = json.loads(json.dumps(runner.compact(runner.judged(make("work", index), second_engine.diagnose))))
+    assert line["diagnosis"], line
+    return line
+
+
+def test_torque_constants_all_wrong_alike_are_one_torque_scale_and_no_rotors():
+    line = said(1)
+    (finding,) = line["diagnosis"]["findings"]
+    assert finding["effect"] == "torque_gain" and finding["joints"] == ["j1", "j2", "j3"]
+    assert scoring.gains(line) == [True] * 3  # each within 5 %
+    gain, true = finding["parameters"]["gain"], line["truth"]["hidden"][0]["parameters"]["gain"]
+    assert abs(gain["value"] - true) < 2.6 * gain["std"]
+
+
+def test_nothing_is_named_where_only_inertials_are_wrong():
+    line = said(2)
+    assert not line["diagnosis"]["findings"] and line["diagnosis"]["verdict"] == "parameters_only"
