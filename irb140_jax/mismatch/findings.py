@@ -78,6 +78,7 @@ def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         "joints": list(robot.joint_names),
         "where": f"all joints: in proportion to the whole torque; the real torque is {gain:.3g} x the logged",
         "parameters": {"gain": {"value": gain, "std": spread, "unit": "1"}},
+        # Without it the inertials stand in for it, as wrong as that takes: on unseen data it is worth nothing.
         "evidence": {"log_odds": float(odds), "probability": beyond, "heldout_gain": 0.0},
         "certain": (
             f"The torque of all joints is logged {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} for the stated "
