@@ -30,6 +30,8 @@ def notes(
         if not enough:
             out.append(f"{name} is not judged: {count} rows in which it moves can be used; record a motion of {name}.")
     out.append(f"The model's inertials are taken to be right to {100 * uncertainty:.3g} % (--inertial-uncertainty).")
+    if not judged.any():
+        return list(dict.fromkeys(out))
     out.append(
         f"Compared below {band.torque:.3g} Hz; positions were smoothed below {band.position:.3g} Hz and "
         "differentiated. Figures leave out rows in which the joint rests: dry friction is undetermined there."
