@@ -108,9 +108,9 @@ def _check_angles(recording: Recording, seen: Glance, robot: Robot, model: Torqu
     far = np.max(np.abs(recording.q[:, hinges]))
     whole, held = (_misfit(seen.tau, part)[hinges] for part in (model.total, model.gravity))
     given = np.median(whole)
-    # Accelerations of coarse positions are noise, which would pass for a wrong unit: gravity needs none.
-    if np.median(np.minimum(whole, held)) < 0.7:
-        return  # in radians the model already tells most of the torque
+    # Accelerations of coarse positions are noise, which would pass for a wrong unit; gravity needs positions only.
+    if given < 0.7 or np.min(held) < 0.7:
+        return  # in radians the model already tells most of the torque, or gravity most of one joint's
     for j in np.flatnonzero(hinges & np.isfinite(robot.lower) & np.isfinite(robot.upper)):
         lower, upper = float(robot.lower[j]), float(robot.upper[j])
         largest = float(np.max(np.abs(recording.q[:, j])))
