@@ -12,7 +12,13 @@ from irb140_jax import cli
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.enough import comparable, sensor_scatter, undecidable
+from irb140_jax.mismatch.enough import (
+    coarse_positions,
+    comparable,
+    scatter_by_sensor,
+    sensor_scatter,
+    undecidable,
+)
 from irb140_jax.mismatch.prove import HeldOut
 from irb140_jax.recordings import write_recording
 from irb140_jax.recordings.condition import choose_band, condition
@@ -38,6 +44,17 @@ def test_encoder_noise_counts_where_torque_is_exact():
     )
     loud, quiet = (sensor_scatter(made.robot(), [r], [condition(r, BAND)], BAND) for r in (rough, fine))
     assert np.all(loud > 3.0 * quiet)
+
+
+@pytest.mark.parametrize(("step", "said"), [(0.0, False), (np.radians(1.0), True)])
+def test_positions_that_limit_the_comparison_are_said(step, said):
+    recording = made.recording(speeds=False, duration=20.0)
+    if step:
+        recording = dataclasses.replace(recording, q=step * np.round(recording.q / step))
+    robot = made.robot()
+    band, recordings, smooth, _ = comparable(robot, [recording])
+    notes = coarse_positions(robot, *scatter_by_sensor(robot, recordings, smooth, band), np.ones(robot.n, dtype=bool))
+    assert [n.startswith("Positions are coarse") for n in notes] == ([True] if said else [])
 
 
 def proof(left: float, rows: int = 2000) -> HeldOut:

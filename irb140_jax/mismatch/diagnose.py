@@ -14,8 +14,9 @@ from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
 from irb140_jax.mismatch.enough import (
     all_open,
+    coarse_positions,
     comparable,
-    sensor_scatter,
+    scatter_by_sensor,
     too_little,
     torque_size,
     undecidable,
@@ -122,8 +123,8 @@ def _diagnosed(
     recordings, twice = without_copies(recordings)
     progress("smoothing and differentiating the positions")
     band, recordings, smooth, again = comparable(robot, recordings)
-    if lacking := too_little(smooth, band):
-        return _nothing_compared(robot, recordings, smooth, band, config, lacking, [*twice, *again])
+    if reason := too_little(smooth, band):
+        return _nothing_compared(robot, recordings, smooth, band, config, reason, [*twice, *again])
     ex = explain(
         robot, smooth, band, config.effects, config.inertial_uncertainty, progress, discrepancy=config.discrepancy
     )
@@ -143,11 +144,13 @@ def _diagnosed(
     gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)
     seen = visibility(ex, matters)
-    said = notes(robot, smooth, band, config.inertial_uncertainty, usable_rows(smooth, band), proof.judged)
+    usual = notes(robot, smooth, band, config.inertial_uncertainty, usable_rows(smooth, band), proof.judged)
     origin = provenance(robot, recordings, config.options, config.words)
-    scatter = sensor_scatter(robot, recordings, smooth, band)
+    parts = scatter_by_sensor(robot, recordings, smooth, band)
+    scatter = np.hypot(*parts)
     missing = undecidable(robot, proof, logged, scatter, band)
-    said = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()] + twice + again + said + gap
+    open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
+    said = [*open_joints, *coarse_positions(robot, *parts, proof.judged), *twice, *again, *usual, *gap]
     every = [*found, *torque_scale_finding(robot, ex)]
     diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
@@ -156,12 +159,12 @@ def _diagnosed(
 
 def _nothing_compared(
     robot: Robot, recordings: Sequence[Recording], smooth: Sequence[Conditioned], band: Band, config: DiagnoseConfig,
-    lacking: str, repaired: list[str],
+    reason: str, repaired: list[str],
 ) -> Result:  # fmt: skip
     """The result where no joint could be compared: undecided, nothing refitted, and every effect open."""
     uncertainty, n = config.inertial_uncertainty, robot.n
     unjudged = notes(robot, smooth, band, uncertainty, usable_rows(smooth, band), np.zeros(n, dtype=bool))
-    said = [f"{lacking}.", *repaired, *unjudged]
+    said = [f"{reason}.", *repaired, *unjudged]
     phi, rest_speed = np.asarray(robot.phi), np.max([r.rest_speed for r in smooth], axis=0)
     model = CorrectedModel(robot, phi, phi, (), band, rest_speed, config.known_joints or robot.joint_names)
     questions, seen = all_open(robot, config.effects, smooth, band, uncertainty)
@@ -174,7 +177,7 @@ def _nothing_compared(
         "notes": said,
         "provenance": provenance(robot, recordings, config.options, config.words),
         "summary": f"{many} recording{'s' if many != 1 else ''} of {joints} can't tell whether the model leaves "
-                   f"anything out. {lacking}.",
+                   f"anything out. {reason}.",
     })  # fmt: skip
     views = {"joints": list(robot.joint_names), "recordings": [r.source for r in recordings], "notes": said}
     empty = {"maps": {}, "motions": [], "ranking": [], "residual_spectrum": {}, "inertials": []}
