@@ -69,9 +69,9 @@ def proof(left: float, rows: int = 2000) -> HeldOut:
         (0.05, 2000, 0.05, None),
         (0.3, 2000, 0.3, None),  # loud sensors, but the model's torque stands above them
         (0.09, 2000, 0.001, None),  # far above the sensors, and small
-        (0.3, 2000, 0.05, "6 times what the sensors scatter by"),
+        (0.3, 2000, 0.05, "6 times the noise of the sensors"),
         (0.7, 2000, 0.7, "70 % of its torque"),
-        (0.05, 100, 0.05, "2 s only"),
+        (0.05, 100, 0.05, "only 2 s"),
     ],
 )
 def test_a_joint_is_told_of_by_enough_motion_and_a_small_residual(left, rows, scatter, said):

@@ -1,4 +1,4 @@
-"""Is there enough to decide?  What the sensors scatter by, and joints of which the recordings can't tell."""
+"""Is there enough to decide?  Noise of the sensors, too few rows, and joints that the recordings can't decide."""
 
 from collections.abc import Sequence
 
@@ -28,7 +28,7 @@ FEWEST_ROWS = 80  # low-passed rows of all recordings together, below which noth
 FEWEST_OF_ONE = 16  # of one recording: fewer have no blocks to leave out, and no noise to measure
 POSES = 100  # of a recording, over which the mass matrix is averaged
 SECONDS = 3.0  # of motion that a joint must show: less is a few reversals, which any law fits
-LARGE = 0.5  # of a joint's torque: what is left hides whatever the model may leave out
+LARGE = 0.5  # of a joint's torque: an error this large may hide anything
 UNLIKE = 3.0  # times the sensors' scatter that can't be called noise any more ...
 NOT_SMALL = 0.1  # ... where it is more than this share of the joint's torque
 
@@ -194,17 +194,18 @@ def undecidable(
         name, unit = robot.joint_names[j], "N" if robot.is_slide[j] else "N m"
         if seconds[j] < SECONDS:
             out[int(j)] = (
-                f"{name} moves for {seconds[j]:.2g} s only: record at least {SECONDS:g} s in which it moves, better "
+                f"{name} moves for only {seconds[j]:.2g} s: record at least {SECONDS:g} s in which it moves, better "
                 "20 s with a dozen reversals"
             )
         elif left[j] > LARGE * size[j]:
             out[int(j)] = (
-                f"what is left on {name}, {left[j]:.3g} {unit}, is {100 * left[j] / max(size[j], 1e-300):.0f} % of its "
-                "torque and may hide anything: check its columns and units, and record faster or longer motion"
+                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {100 * left[j] / max(size[j], 1e-300):.0f} % "
+                "of its torque and may hide anything: check its columns and units, and record faster or longer motion"
             )
         elif left[j] > max(NOT_SMALL * size[j], UNLIKE * scatter[j]):
+            times, share = left[j] / max(scatter[j], 1e-300), 100 * left[j] / max(size[j], 1e-300)
             out[int(j)] = (
-                f"what is left on {name}, {left[j]:.3g} {unit}, is {left[j] / max(scatter[j], 1e-300):.2g} times what "
-                "the sensors scatter by and no small part of its torque: check its columns, and record longer motion"
+                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {times:.2g} times the noise of the sensors and "
+                f"{share:.0f} % of its torque: check its columns, and record longer motion"
             )
     return out
