@@ -205,7 +205,7 @@ def undecidable(
         elif left[j] > max(NOT_SMALL * size[j], UNLIKE * scatter[j]):
             times, share = left[j] / max(scatter[j], 1e-300), 100 * left[j] / max(size[j], 1e-300)
             out[int(j)] = (
-                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {times:.2g} times the noise of the sensors and "
-                f"{share:.0f} % of its torque: check its columns, and record longer motion"
+                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {times:.2g} times the noise of the sensors "
+                f"and {share:.0f} % of its torque: check its columns, and record longer motion"
             )
     return out
