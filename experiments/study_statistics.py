@@ -24,6 +24,7 @@ FAMILIES = {
     "control": "Tables 4 and 5: every statement of the text in every reading of the control",
     "network": "what each penalty changes near singular poses",
     "future": "the swarms that the study leaves to the future, with torque noise",
+    "tracking": "QPSO against PSO when the closed loop is the objective",
 }
 
 
