@@ -23,7 +23,7 @@ from study_arm import StudyArm, StudyConfig
 from study_provenance import made, store
 from study_readings import SEEDS, Reading, rule
 from study_statistics import Test, said, tested
-from torque_swarms import Unknowns, recorded
+from torque_swarms import TorqueError, recorded
 
 from irb140_jax import identify, swarm
 from irb140_jax.compilation_cache import set_up_compilation_cache
@@ -67,7 +67,7 @@ class Measured(eqx.Module):
     entry, and a rest of s^2 chi^2 with as many degrees of freedom as there are equations left (Cochran's theorem).
     """
 
-    aim: Unknowns
+    aim: TorqueError
     noise: Scalar
 
     def __call__(self, unknowns: Float[Array, " u"], progress: Scalar) -> Scalar:
@@ -88,20 +88,19 @@ class Measured(eqx.Module):
 def run(config: Config, study: StudyArm) -> pd.DataFrame:
     """One row a run: errors of the parameters, and of torque on another motion."""
     robot, links = study.whole, study.links
-    place = jnp.asarray(np.flatnonzero(study.searched))
     where = jnp.asarray(np.random.default_rng(0).uniform(size=study.x.shape))
-    lower, upper = (end[place] for end in identify.box(study.x, config.width, place=where))
+    lower, upper = study.unknowns.box(config.width, place=where)
     size: dict[str, Any] = {"particles": 12, "iterations": 10} if config.smoke else {}
     clean = recorded(robot, config.duration, 0.0, seed=1)
     fit = identify.linear_fit(robot, links, clean)
     unseen = identify.linear_fit(robot, links, recorded(robot, config.duration, 0.0, seed=2))
-    aim, rms = Unknowns(fit, study.x, place), float(jnp.sqrt(jnp.mean(clean.tau**2)))
+    aim, rms = TorqueError(fit, study.unknowns), float(jnp.sqrt(jnp.mean(clean.tau**2)))
     keys, frames = swarm.seed_keys(config.seeds), []
-    held_out = jax.jit(jax.vmap(lambda u: unseen(aim.all(u), jnp.zeros(()))))
+    held_out = jax.jit(jax.vmap(lambda u: unseen(study.unknowns.full(u), jnp.zeros(()))))
     for name, own in RULES.items():
         for noise in config.noise:
             found = swarm.minimise(Measured(aim, jnp.asarray(noise * rms)), own, lower, upper, keys=keys, **size)
-            com, inertia = study.mape(np.asarray(study.full(found.x)))
+            com, inertia = study.unknowns.mape(np.asarray(study.unknowns.full(found.x)))
             row = {"swarm": name, "noise": noise, "seed": np.arange(config.seeds), "com": com, "inertia": inertia,
                    "held_out": np.asarray(held_out(found.x))}  # fmt: skip
             frames.append(pd.DataFrame(row))

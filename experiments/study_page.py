@@ -183,7 +183,9 @@ def provenance(folder: pathlib.Path) -> list[dict]:
     for path in sorted(folder.glob("*.json")):
         stored = json.loads(path.read_text(encoding="utf-8"))
         if path.stem in STORED and isinstance(stored, dict):
-            rows.append({"file": path.name, "made": stored.get("made")})
+            made = stored.get("made")
+            commits = ", ".join(made.get("commits", [made["commit"]])) if made else ""
+            rows.append({"file": path.name, "made": made, "commits": commits})
     return rows
 
 

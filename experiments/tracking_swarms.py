@@ -35,7 +35,7 @@ from study_readings import ITERATIONS, PARTICLES, SEEDS, Reading, rule
 from study_statistics import Test, tested
 from tracking_report import figure, page
 
-from irb140_jax import control, identify, simulate, swarm
+from irb140_jax import control, simulate, swarm
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.dynamics import regressor_batch
 from irb140_jax.recordings.excite import fourier_motion
@@ -164,7 +164,7 @@ def objective(name: str, loop: Loop, truth: dict[str, float]) -> Callable[[Float
     """Fitness of the unknowns: one measure, or all three, each as a multiple of what the true model reaches."""
 
     def fitness(unknowns: Float[Array, " u"], progress: Scalar) -> Scalar:
-        measures = loop.measures(loop.study.full(unknowns))
+        measures = loop.measures(loop.study.unknowns.full(unknowns))
         return measures[name] if name in measures else jnp.sum(jnp.stack([measures[k] / truth[k] for k in measures]))
 
     return fitness
@@ -176,15 +176,14 @@ def seen(loop: Loop) -> dict:
     A parameter's share is the squared length of its projection onto the directions that show at all; torque's own
     share, through the regressor along the same motion, stands beside it.
     """
-    study, x = loop.study, loop.study.x
-    sought = np.flatnonzero(study.searched)
-    size = jnp.abs(x[sought])
+    study = loop.study
+    place, size = study.unknowns.place, jnp.abs(study.unknowns.start)
     # Derivatives by the simpler integrator: its own error does not depend on what the controller believes.
-    errors = lambda y: loop.motion(study.full(y * size), simulate.SemiImplicitEuler()).q.ravel()  # noqa: E731
-    J = np.asarray(jax.jit(jax.jacfwd(errors))(x[sought] / size))
-    torques = lambda y: loop.torque(study.full(y * size)).ravel()  # noqa: E731
-    Y = np.asarray(jax.jit(jax.jacfwd(torques))(x[sought] / size))
-    told: dict[str, Any] = {"names": [study.names[i] for i in sought]}
+    errors = lambda y: loop.motion(study.unknowns.full(y * size), simulate.SemiImplicitEuler()).q.ravel()  # noqa: E731
+    J = np.asarray(jax.jit(jax.jacfwd(errors))(study.unknowns.start / size))
+    torques = lambda y: loop.torque(study.unknowns.full(y * size)).ravel()  # noqa: E731
+    Y = np.asarray(jax.jit(jax.jacfwd(torques))(study.unknowns.start / size))
+    told: dict[str, Any] = {"names": [study.unknowns.names[i] for i in place]}
     for name, matrix in (("tracking", J), ("torque", Y)):
         _, values, directions = np.linalg.svd(matrix, full_matrices=False)
         shown = values > ROUND_OFF * values[0]
@@ -201,24 +200,24 @@ def seen(loop: Loop) -> dict:
 def search(config: Config, loop: Loop, name: str, algorithm: str, truth: dict[str, float]) -> dict[str, np.ndarray]:
     """What the seeds of one search found, and the processor time that it took [s]."""
     study, started = loop.study, time.process_time()
-    lower, upper = (end[study.searched] for end in box_of(config, study))
+    lower, upper = box_of(config, study)
     found = swarm.minimise(
         objective(name, loop, truth), RULES[algorithm], lower, upper, keys=swarm.seed_keys(config.seeds), **config.size
     )
-    x, fitness = np.asarray(study.full(found.x)), np.asarray(found.fitness)
+    x, fitness = np.asarray(study.unknowns.full(found.x)), np.asarray(found.fitness)
     return {"x": x, "fitness": fitness, "seconds": np.array(time.process_time() - started)}
 
 
-def box_of(config: Config, study: StudyArm) -> tuple[Float[Array, " d"], Float[Array, " d"]]:
+def box_of(config: Config, study: StudyArm) -> tuple[Float[Array, " u"], Float[Array, " u"]]:
     """Where the candidates lie; the truth is not in its middle."""
     place = np.random.default_rng(0).uniform(size=study.x.shape)
-    return identify.box(study.x, config.width, place=jnp.asarray(place))
+    return study.unknowns.box(config.width, place=jnp.asarray(place))
 
 
 def judged(name: str, algorithm: str, x: np.ndarray, loops: tuple[Loop, Loop]) -> pd.DataFrame:
     """One row a run: errors of the parameters, and what the set does in the loop that was searched and in another."""
     study = loops[0].study
-    com, inertia = study.mape(x)
+    com, inertia = study.unknowns.mape(x)
     own, other = (loop.measures_of(jnp.asarray(x)) for loop in loops)
     tau, true = (np.asarray(jax.vmap(loops[1].torque)(jnp.asarray(y))) for y in (x, np.asarray(study.x)[None]))
     told = {"objective": name, "algorithm": algorithm, "seed": np.arange(len(x)), "com": com, "inertia": inertia}
@@ -260,8 +259,8 @@ def _run(motion: str, config: Config, loops: tuple[Loop, Loop], searches: list) 
         frames.append(judged(name, algorithm, found["x"], loops))
         seconds.append(float(found["seconds"]))
         print(f"  done: {motion}, {name}, {algorithm}", flush=True)
-    lower, upper = box_of(config, study)
-    frames.append(judged("middle of the box", "", np.asarray(alike(0.5 * (lower + upper))), loops).iloc[:1])
+    middle = np.asarray(alike(study.unknowns.full(0.5 * sum(box_of(config, study)))))
+    frames.append(judged("middle of the box", "", middle, loops).iloc[:1])
     told = {"truth": truth, "truth_unseen": unseen, "seeds": config.seeds, "seconds": sum(seconds)}
     told["seen"] = seen(loops[0])
     return pd.concat(frames, ignore_index=True), told
