@@ -127,8 +127,9 @@ def table(result: dict) -> str:
         own = {row["noise"]: row for row in result["rows"] if row["swarm"] == name}
         cells = [f"{own[n]['held_out']:.3g} | {own[n]['com']:.3g} / {own[n]['inertia']:.3g}" for n in noises]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    lines += ["", "Medians of the seeds: torque on another motion without noise, errors of the parameters.  Held-out torque:", ""]
-    return "\n".join(lines + [f"- {test['name']}: {said(test)}" for test in result["tests"]])
+    lines += ["", f"Medians of {result['tests'][0]['n'][0]} seeds: torque on another motion without noise, errors of the parameters.  Is the "
+              f"held-out torque lower than that of {PLAIN}?", ""]  # fmt: skip
+    return "\n".join(lines + [f"- {test['name'].removesuffix(f' lower than {PLAIN}')}: {said(test)}" for test in result["tests"]])
 
 
 def main(config: Config) -> None:

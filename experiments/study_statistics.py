@@ -127,14 +127,16 @@ def said(row: dict, unit: str = "") -> str:
     """A test in words."""
     low, high = row["effect_interval"]
     text = f"p = {row['p_holm']:.1g} (Holm), effect {row['effect']:.2f} [{low:.2f}, {high:.2f}]"
+    # The interval is of this test alone, p of the whole family.
+    alone = "; alone it would count, among so many tests it does not" * bool(row["p"] < ALPHA <= row["p_holm"])
     if row["difference"] is None:
-        return text
+        return text + alone
     ends = row["difference_interval"]
     text += f", means differ by {row['difference']:.2g}{unit} [{ends[0]:.2g}, {ends[1]:.2g}]"
     sure = ends[0] * ends[1] > 0.0
     if sure and math.copysign(1.0, row["difference"]) * row["effect"] < 0.0:
         text += "; the means point the other way than most runs, because of a few runs with large values"
-    return text
+    return text + alone
 
 
 def rounded(values: np.ndarray, digits: int = DIGITS) -> np.ndarray:

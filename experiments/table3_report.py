@@ -48,7 +48,8 @@ def judged(runs: pd.DataFrame, readings: pd.DataFrame) -> pd.DataFrame:
     by = runs.astype({k: float for k in ("com", "inertia", "fitness")}).groupby("reading", sort=False)
     told = pd.DataFrame({key: by[key].mean() for key in ("com", "inertia", "fitness", "at_wall", "possible")})
     told = told.assign(**{f"{key}_sd": by[key].std() for key in ("com", "inertia", "fitness")})
-    told = told.assign(plateau=by["plateau"].median(), outliers=by["fitness"].apply(outliers))
+    told = told.assign(plateau=by["plateau"].median(), outliers=by["fitness"].apply(outliers),
+                       fitness_iqr=by["fitness"].quantile(0.75) - by["fitness"].quantile(0.25))  # fmt: skip
     return readings.merge(told, left_on="reading", right_index=True, validate="one_to_one")
 
 
@@ -61,7 +62,8 @@ def outliers(values: pd.Series) -> int:
 def distance(row: dict, family: str) -> float:
     """How far a row is from the published one: root mean square of the logarithms of ours over published."""
     published = PUBLISHED[family]
-    logs = [math.log(max(row[k], 1e-12) / published[k]) for k in ("com", "inertia")]
+    known = [k for k in ("com", "inertia") if math.isfinite(row[k])]  # of centres that are all zero there is no error
+    logs = [math.log(max(row[k], 1e-12) / published[k]) for k in known]
     if "plateau" in published:
         logs.append(math.log(max(row["plateau_of_mean"], 1) / published["plateau"]))
     return math.sqrt(float(np.mean(np.square(logs))))
@@ -116,6 +118,16 @@ def pairs_of_readings(told: pd.DataFrame, column: str) -> dict[str, float]:
     return {"lower": lower / max(count, 1), "higher": higher / max(count, 1), "pairs": count}
 
 
+def shares_of_pairs(told: pd.DataFrame, holds) -> tuple[float, int]:
+    """Share of all pairs of readings of one problem in which holds(PSO's rows, QPSO's rows) is true, and their number."""
+    yes = count = 0
+    for _, problem in told[told["box"] == 0].groupby(PROBLEM):
+        pso, qpso = ({c: problem.loc[problem["algorithm"] == f, c].to_numpy() for c in problem} for f in PUBLISHED)
+        found = holds({c: v[None] for c, v in pso.items()}, {c: v[:, None] for c, v in qpso.items()})
+        yes, count = yes + int(found.sum()), count + found.size
+    return yes / max(count, 1), count
+
+
 def tests_of(pair: dict[str, dict]) -> list[Test]:
     """QPSO against PSO in this pair; Table 5's first rows."""
     of = lambda f: (("reading", pair[f]["reading"]),)  # noqa: E731
@@ -127,7 +139,7 @@ def tests_of(pair: dict[str, dict]) -> list[Test]:
 def summary(told: pd.DataFrame, baselines: list[dict], folder: pathlib.Path) -> dict:
     """What is written: nearest readings, tests, baselines, and who reaches what."""
     of = lambda family: told[told["algorithm"] == family]  # noqa: E731
-    least = lambda some: some.loc[(some["com"] + some["inertia"]).idxmin()].to_dict()  # noqa: E731
+    least = lambda some: some.loc[some[["com", "inertia"]].sum(axis=1).idxmin()].to_dict()  # noqa: E731
     pair = pair_of(told)
     usual = ~told["algorithm"].isin(list(PUBLISHED)) & (told["units"] == "normalised") & (told["width"] == 0.5)
     boxes = told[told["box"] > 0]

@@ -51,7 +51,12 @@ def _line(name: str, by: str, errors: tuple[str, ...], own: dict, other: dict, t
 
 def said_of_tests(result: dict) -> str:
     """QPSO against PSO at each objective."""
-    return "\n".join(f"- {test['name']}: {said(test)}" for test in result["tests"])
+    words = {"com": "centres of mass", "inertia": "inertias", "torque_rmse": "torque elsewhere"}
+    lines = []
+    for test in result["tests"]:
+        about, _, key = test["name"].removesuffix(", QPSO lower than PSO").rpartition(": ")
+        lines.append(f"- {about}: {words[key]}, n = {test['n'][0]}: {said(test)}")
+    return "Is QPSO's error lower than PSO's?\n\n" + "\n".join(lines) if lines else ""
 
 
 def said_of_seen(result: dict) -> str:
@@ -62,7 +67,7 @@ def said_of_seen(result: dict) -> str:
     whole = [name for name, s in zip(names, share, strict=True) if s > 1.0 - 1e-6]
     return (
         f"Of {len(names)} unknowns the closed loop shows {told['tracking']['rank']} combinations, torque itself "
-        f"{told['torque']['rank']}, along this motion; a change of 10 % shows above the encoder's 0.01° in "
+        f"{told['torque']['rank']}, along this motion; a change of 10 % shows above 0.01° of a joint in "
         f"{told['above_encoder']}.  Not seen at all: {', '.join(blind) or 'none'}.  "
         f"Seen alone, not only in combination with others: {', '.join(whole) or 'none'}."
     )
