@@ -17,6 +17,7 @@ import dataclasses
 import itertools
 import json
 import math
+import pathlib
 import time
 
 import jax
@@ -108,7 +109,7 @@ def _round(values, digits: int = 5) -> list[float]:
 def run(config: Config, arm: StudyArm, readings: list[Reading]) -> list[dict]:
     """Judge the readings that the file of results lacks; all rows."""
     path = config.folder(arm) / "table3_swarms.jsonl"
-    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    rows = _stored(path, config.size["seeds"])
     done, mesh, commit = {row["name"] for row in rows}, config.mesh, made(config.said())["commit"]
     started = time.perf_counter()
     for number, reading in enumerate(readings):
@@ -120,6 +121,17 @@ def run(config: Config, arm: StudyArm, readings: list[Reading]) -> list[dict]:
         if number % 100 == 0 or number == len(readings) - 1:
             print(f"{number + 1}/{len(readings)} readings, {time.perf_counter() - started:.0f} s", flush=True)
     return rows
+
+
+def _stored(path: pathlib.Path, seeds: int) -> list[dict]:
+    """Rows of an earlier run of this size; a last line that was cut off in the middle is cut off whole."""
+    if not path.exists():
+        return []
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    if whole != text:
+        path.write_text(whole, encoding="utf-8")
+    return [row for row in map(json.loads, whole.splitlines()) if len(row["com"]) == seeds]
 
 
 def baselines(arm: StudyArm, few: bool) -> list[dict]:

@@ -54,6 +54,7 @@ VISIBLE_CHANGE = 0.1  # share by which parameters change when visibility is aske
 ROUND_OFF = 1e-9  # share of the largest singular value below which a direction is not there at all
 FILE = "tracking_runs.parquet"
 FOURIER, CIRCLE = "Fourier motion", "circle"
+FEWEST = 10  # runs of a search of which a test can say anything after Holm's correction
 MEASURES = ("tracking", "smoothness", "energy")
 
 
@@ -198,14 +199,15 @@ def seen(loop: Loop) -> dict:
 
 
 def search(config: Config, loop: Loop, name: str, algorithm: str, truth: dict[str, float]) -> dict[str, np.ndarray]:
-    """What the seeds of one search found, and the processor time that it took [s]."""
+    """What the seeds of one search found, the processor time that it took [s], and the commit that ran it."""
     study, started = loop.study, time.process_time()
     lower, upper = box_of(config, study)
     found = swarm.minimise(
         objective(name, loop, truth), RULES[algorithm], lower, upper, keys=swarm.seed_keys(config.seeds), **config.size
     )
     x, fitness = np.asarray(study.unknowns.full(found.x)), np.asarray(found.fitness)
-    return {"x": x, "fitness": fitness, "seconds": np.array(time.process_time() - started)}
+    commit = made(config.said())["commit"]
+    return {"x": x, "fitness": fitness, "seconds": np.array(time.process_time() - started), "commit": np.array(commit)}
 
 
 def box_of(config: Config, study: StudyArm) -> tuple[Float[Array, " u"], Float[Array, " u"]]:
@@ -252,17 +254,18 @@ def _run(motion: str, config: Config, loops: tuple[Loop, Loop], searches: list) 
     folder = config.folder(study) / "tracking_runs"
     folder.mkdir(exist_ok=True)
     mark = _mark(config, loops[0])
-    frames, seconds = [], []
+    frames, seconds, commits = [], [], set()
     for name, algorithm in searches:
         path = folder / f"{motion}_{name}_{algorithm}.npz".replace(" ", "_")
         found = _stored(path, mark, lambda n=name, a=algorithm: search(config, loops[0], n, a, truth))
         frames.append(judged(name, algorithm, found["x"], loops))
         seconds.append(float(found["seconds"]))
+        commits.add(str(found["commit"]))
         print(f"  done: {motion}, {name}, {algorithm}", flush=True)
     middle = np.asarray(alike(study.unknowns.full(0.5 * sum(box_of(config, study)))))
     frames.append(judged("middle of the box", "", middle, loops).iloc[:1])
     told = {"truth": truth, "truth_unseen": unseen, "seeds": config.seeds, "seconds": sum(seconds)}
-    told["seen"] = seen(loops[0])
+    told |= {"commits": sorted(commits), "seen": seen(loops[0])}
     return pd.concat(frames, ignore_index=True), told
 
 
@@ -280,13 +283,13 @@ def rows_of(frame: pd.DataFrame) -> list[dict]:
 
 
 def tests_of(frame: pd.DataFrame) -> list[Test]:
-    """QPSO against PSO at each objective, by what the parameters are worth: their errors, and unseen torque."""
-    searches = frame.loc[frame["algorithm"] == "QPSO", ["motion", "objective"]].drop_duplicates()
+    """QPSO against PSO at each objective with enough runs, by what the sets are worth: their errors, unseen torque."""
+    searches = frame.loc[frame["algorithm"] == "QPSO"].groupby(["motion", "objective"], sort=False).size()
     of = lambda motion, objective, by: (("motion", motion), ("objective", objective), ("algorithm", by))  # noqa: E731
     return [
         Test("tracking", f"{motion}, {name}: {key}, QPSO lower than PSO", FILE, key, of(motion, name, "QPSO"),
              of(motion, name, "PSO"))
-        for motion, name in searches.itertuples(index=False)
+        for motion, name in searches[searches >= FEWEST].index
         for key in ("com", "inertia", "torque_rmse")
     ]  # fmt: skip
 
@@ -320,7 +323,8 @@ def main(config: Config) -> None:
     frame, told = run(config, study)
     store(frame, folder / FILE)
     motions = {motion: part | {"rows": rows_of(frame[frame["motion"] == motion])} for motion, part in told.items()}
-    result = {"made": made(config.said()), "config": config.said(), "arm": study.name, **motions.pop(FOURIER)}
+    own = made(config.said()) | {"commits": sorted({commit for part in told.values() for commit in part["commits"]})}
+    result = {"made": own, "config": config.said(), "arm": study.name, **motions.pop(FOURIER)}
     result |= {"circle": motions.get(CIRCLE), "tests": tested(tests_of(frame), folder)}
     (folder / "tracking_swarms.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     (folder / "tracking_swarms.md").write_text(page(result), encoding="utf-8")
