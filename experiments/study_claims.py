@@ -201,8 +201,8 @@ def _plateau(table: dict, told: pd.DataFrame) -> Claim:
     pair, over = table["nearest_pair"], table["over_pairs"]["plateau"]
     stated = PUBLISHED["pso"]["plateau"]
     near = np.abs(np.log(np.maximum(told.loc[told["algorithm"] == "pso", "plateau"], 1.0) / stated)) < math.log(NEAR)
-    by_limit = _by_limit(told, "plateau")
-    moved = f"PSO's own plateau goes from {by_limit[0][1]:.0f} to {by_limit[-1][1]:.0f} iterations with its velocity limit" if by_limit else ""
+    own = [iterations for _, iterations in _by_limit(told, "plateau")]
+    moved = f"the velocity limit alone moves PSO's own plateau between {min(own):.0f} and {max(own):.0f} iterations" if own else ""
     return Claim(
         "PSO plateaus after about 27 iterations, QPSO later",
         f"QPSO later in {percent(over['higher'])}, earlier in {percent(over['lower'])} of {over['pairs']} pairs of readings; medians of the "
