@@ -9,6 +9,7 @@ import math
 import os
 import pathlib
 from collections import Counter
+from typing import Any
 
 import jinja2
 import mlp_report
@@ -89,7 +90,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         verdicts={v: count[v] for v in VERDICTS if count[v]},
         table1=tables_1_2_arm.table1(arm), table2=tables_1_2_arm.table2(arm),
         seeds=len(sets["sets"]["PSO"]), parameters=parameters(sets), table4=table4(t4), choices=study_choices.table(choices),
-        walls=walls(sets), families=FAMILIES, alpha=ALPHA, shown=t4["shown"].replace("_", " "), tracking=tracking, span=lambda x: study_choices.between(*x, 3),
+        walls=walls(sets), families=FAMILIES, alpha=ALPHA, shown=t4["shown"].replace("_", " "), tracking=tracking, span=lambda x: study_choices.between(x[0], x[1], 3),
         noisy_table=noisy_swarms.table(noisy) if noisy else "", embedded=embedded, made=provenance(folder),
         share=f"{100 * t4['config']['share']:.0f}", mujoco=max(t4["mujoco"].values()), table5=table5(t3, t4, of.is_studys),
         torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking) if tracking else "",
@@ -104,9 +105,9 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
 
 def of_circle(tracking: dict | None) -> dict:
     """What the searches along the circle are shown by, and the time that all would take: 4 objectives in place of 1."""
-    told = tracking["circle"] if tracking else None
-    if not told:
+    if not tracking or not tracking["circle"]:
         return {"circle_table": "", "circle_seen": "", "circle_hours": 0.0}
+    told = tracking["circle"]
     hours = 4.0 * told["seconds"] / 3600.0 * tracking["seeds"] / told["seeds"]
     return {"circle_table": tracking_report.table(told), "circle_seen": tracking_report.said_of_seen(told), "circle_hours": hours}
 
@@ -126,7 +127,7 @@ class Undefined(float):
         return "not defined"
 
 
-def _defined(stored):
+def _defined(stored: Any) -> Any:
     """What is stored, errors that are not defined as such; they are stored as null, or NaN."""
     if isinstance(stored, list):
         return [_defined(part) for part in stored]

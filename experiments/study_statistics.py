@@ -126,8 +126,8 @@ def _interval(values: np.ndarray) -> list[float]:
 def said(row: dict, unit: str = "") -> str:
     """A test in words."""
     low, high = row["effect_interval"]
-    # Two digits where one could hide on which side of the limit it is.
-    digits = 2 if 0.5 < row["p_holm"] / ALPHA < 2.0 else 1
+    # More digits where one could hide on which side of the limit it is.
+    digits = 3 if 0.5 < row["p_holm"] / ALPHA < 2.0 else 1
     text = f"p = {row['p_holm']:.{digits}g} (Holm), effect {row['effect']:.2f} [{low:.2f}, {high:.2f}]"
     # The interval is of this test alone, p of the whole family.
     alone = "; alone it would count, among so many tests it does not" * bool(row["p"] < ALPHA <= row["p_holm"])

@@ -9,6 +9,7 @@ import pathlib
 import re
 import shutil
 import sys
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -93,14 +94,14 @@ def test_errors_that_are_not_defined_are_called_so_and_nothing_is_claimed_of_the
     assert "| all centres of mass of this arm are zero |  | **cannot be judged** |" in page
 
 
-def without_centres(stored):
+def without_centres(stored: Any) -> Any:
     """A result as it is stored for an arm whose centres of mass are all zero."""
     if isinstance(stored, list):
         return [without_centres(part) for part in stored]
     if not isinstance(stored, dict):
         return stored
     undefined = {key: None for key in ("com", "com_sd", "averaged_com") if isinstance(stored.get(key), float)}
-    told = {key: without_centres(value) for key, value in stored.items()} | undefined
+    told: dict[str, Any] = {key: without_centres(value) for key, value in stored.items()} | undefined
     if "over_pairs" in told:
         told["over_pairs"]["com"] = {"lower": 0.0, "higher": 0.0, "pairs": 0}
     if told.get("column") == "com":
