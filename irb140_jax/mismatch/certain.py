@@ -39,7 +39,7 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
         "what is logged there)"
         for j in listed
     ]
-    gain = float(np.clip(held_out_gain(ex, index)[0], 0.0, 0.9999))
+    gain = float(np.clip(held_out_gain(ex, index), 0.0, 0.9999))
     said = f"Beyond what rigid bodies explain, the torque needs {_listed(sizes)}"
     said += f"; it removes {_percent(gain)} of the squared error on unseen data"
     if len(c.joints) == 1 and (c.effect.friction or c.slug in TWO_WAYS):

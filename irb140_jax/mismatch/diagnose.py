@@ -14,12 +14,12 @@ from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
 from irb140_jax.mismatch.enough import sensor_scatter, torque_size, undecidable
 from irb140_jax.mismatch.explain import explain
-from irb140_jax.mismatch.explanation import Explanation, explained_by, fitted, full_posterior
+from irb140_jax.mismatch.explanation import Explanation, fitted
 from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding
 from irb140_jax.mismatch.model import CorrectedModel, Named
 from irb140_jax.mismatch.native import native_gap
 from irb140_jax.mismatch.notes import gap_notes, notes
-from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, lasting, refitted, transferring
+from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, refitted
 from irb140_jax.mismatch.provenance import provenance
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
 from irb140_jax.mismatch.undecided import Undecided, undecided
@@ -47,15 +47,12 @@ class DiagnoseConfig:
         words: What the command line said beside the recordings and the uncertainty, to be kept in the diagnosis:
             `--robot arm.xml`.
         known_joints: Every joint of the model's file, where the robot is a part of it; see `CorrectedModel`.
-        discrepancy: Whether laws may be wrong by a function of the state, and logs by the instrument: the second
-            engine, which is being compared with the first.
     """
 
     inertial_uncertainty: float = 0.05
     effects: tuple[AbstractEffect, ...] = tuple(CATALOGUE.values())
     words: tuple[str, ...] = ()
     known_joints: tuple[str, ...] = ()
-    discrepancy: bool = False
 
     @property
     def options(self) -> dict[str, Any]:
@@ -122,19 +119,16 @@ def _diagnosed(
             f"{smooth[int(np.argmin(rows))].source}: {min(rows)} samples below {band.torque:.3g} Hz are left after "
             f"conditioning, {sum(rows)} in all; that is too few to compare, record at least 15 s of motion"
         )
-    ex = explain(
-        robot, smooth, band, config.effects, config.inertial_uncertainty, progress, discrepancy=config.discrepancy
-    )
+    scatter = sensor_scatter(robot, recordings, smooth, band)
+    ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, scatter, progress)
     progress("proving on data that the fit did not see")
-    ex = ex if config.discrepancy else lasting(transferring(ex))
-    refit, proof, rest = _proved(ex, progress)
-    doubtful = set() if config.discrepancy else {c for u in rest for c in u.doubtful}
-    if doubtful:  # names that only stand in for what has none
-        ex = explained_by(ex, tuple(c for c in ex.chosen if c not in doubtful))
-        refit, proof, rest = _proved(ex, progress)
+    refit = refitted(ex)
+    proof = held_out(ex, refit)
+    progress("looking for structure that no effect explains")
+    rest = unexplained(ex, proof)
     found = findings(robot, ex)
     model = _model(robot, ex, refit, band, config.known_joints or robot.joint_names)
-    w = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen).mean * ex.data.scale[ex.columns()]
+    w = ex.posterior(instrument=False).mean * ex.data.scale[ex.columns()]
     logged = [s.tau for s in ex.data.stretches]
     corrected = [s.tau - s.y + s.X[..., ex.columns()] @ w for s in ex.data.stretches]
     lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
@@ -144,7 +138,6 @@ def _diagnosed(
     usable = np.sum([r.usable[band.kept(len(r.t))].sum(axis=0) for r in smooth], axis=0)
     said = notes(robot, smooth, band, config.inertial_uncertainty, usable, proof.judged)
     origin = provenance(robot, recordings, config.options, config.words)
-    scatter = sensor_scatter(robot, recordings, smooth, band)
     missing = undecidable(robot, proof, logged, scatter, band)
     said = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()] + twice + again + said + gap
     every = [*found, *torque_scale_finding(robot, ex)]
@@ -170,18 +163,10 @@ def _finite(recording: Recording) -> Recording:
     return recording
 
 
-def _proved(ex: Explanation, progress: Callable[[str], None]) -> tuple[Refit, HeldOut, list[Unexplained]]:
-    """The refit beside an explanation, both on data that they did not see, and what is left without a name."""
-    refit = refitted(ex)
-    proof = held_out(ex, refit)
-    progress("looking for structure that no effect explains")
-    return refit, proof, unexplained(ex, proof)
-
-
 def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band, known: tuple[str, ...]) -> CorrectedModel:
     loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
     refitted_shift, _, _ = fitted(ex.data, refit.posterior(), loose, ex.factor)
-    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    post = ex.posterior(instrument=False)
     dphi, members, amplitudes = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)
     named = tuple(Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True))

@@ -44,7 +44,7 @@ _masses = eqx.filter_jit(jax.vmap(dynamics.mass_matrix, in_axes=(None, 0)))
 
 def torque_size(proof: HeldOut, torque: Sequence[np.ndarray]) -> np.ndarray:
     """Standard deviation of each joint's low-passed torque over the rows that count, shape (n,)."""
-    out = np.zeros(len(proof.floor))
+    out = np.zeros(len(proof.carried))
     for j in range(len(out)):
         values = np.concatenate([x[u[:, j], j] for x, u in zip(torque, proof.use, strict=True)])
         out[j] = np.std(values) if len(values) else 0.0

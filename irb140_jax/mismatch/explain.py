@@ -8,31 +8,22 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
-from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble, first_noise, problem
+from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
-from irb140_jax.mismatch.explanation import (
-    Explanation,
-    explained_by,
-    fitted,
-    full_posterior,
-    noise_under,
-    parts,
-)
+from irb140_jax.mismatch.explanation import Explanation, fitted
 from irb140_jax.mismatch.model import Named, better_known, composed
-from irb140_jax.mismatch.name import guessed, search
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.nuisances import nuisances
 from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
-from irb140_jax.mismatch.selection.selected import selected
-from irb140_jax.mismatch.silent import SoftFriction
+from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
+from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.mismatch.tangent import Point, point
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
-WEIGHTLESS = 0.43  # standard deviations of a payload's mass: with less, the odds that there is any are below two to one
 PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both ...
 MOST_PASSES = 5  # ... unless a shape is known far better than its grid is fine:
 COARSE = 100.0  # its best point stands alone by so much in log odds, and a law that is a little off leaves as much
@@ -44,9 +35,8 @@ def explain(
     band: Band,
     effects: Sequence[AbstractEffect],
     uncertainty: float,
+    sensors: np.ndarray,
     progress: Callable[[str], None] = lambda _: None,
-    *,
-    discrepancy: bool = False,
 ) -> Explanation:
     """Search for what the model leaves out.
 
@@ -56,14 +46,14 @@ def explain(
         band: Of the comparison.
         effects: The library.
         uncertainty: Relative standard deviation of the inertials.
+        sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         progress: Told what is being done.
-        discrepancy: Whether laws may be wrong (see `regression.discrepancy`).
     """
-    factor, effects = inertial_prior_factor(robot, 1.0), (*effects, SoftFriction())
+    factor = inertial_prior_factor(robot, 1.0)
     progress("rigid body along the recordings")
     along = [prepared(robot, r) for r in recordings]
     scales = scales_of(along)
-    lib = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
+    lib = first = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     loads: list[Loads | None] = [None] * len(recordings)
     at: Point | None = None
     chosen: tuple[int, ...] = ()
@@ -85,65 +75,31 @@ def explain(
             return explained_at(None, turn, blocks)  # an explanation without bounds is nothing to start from
         data = assemble(lib, rows, uncertainty)
         progress(f"searching sets of explanations (round {turn})")
-        if discrepancy:
-            both = zip(along, loads, strict=True)
-            known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in both]
-            found = selected(data, nuisances(robot, along, known, band, scales), chosen)
-            prob, g = problem(data, found.noise, blocks, settled=turn > 1)
-            return Explanation(lib, scales, data, found.noise, found.chosen, prob, g, found.chosen, factor, found)
-        return _settled(lib, scales, data, factor, chosen, noise, blocks, settled=turn > 1)
+        known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in zip(along, loads, strict=True)]
+        extra = nuisances(robot, along, known, band, scales)
+        whitening = noise or flexible_noise(data, extra)
+        space = space_of(data, extra, whitening, lib, first, sensors, blocks)
+        best, settings, sets = selected(space, chosen)
+        return Explanation(lib, scales, data, extra, whitening, space, best, settings, sets, factor)
 
     turn, coarse = 1, False
     while turn < PASSES or (coarse and turn < MOST_PASSES):
         ex = explained(turn, blocks=1)
-        found = fitted(ex.data, full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), ex.chosen, factor)
-        named = _named(found)
-        better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), named)
-        along, at = [seen_by(better, r) for r in along], point(robot, found[0], named)
+        found = fitted(ex.data, ex.posterior(), ex.chosen, factor)
+        physics = _physics(found)
+        better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
+        along, at = [seen_by(better, r) for r in along], point(robot, found[0], physics)
         loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
-        (lib, chosen), noise, coarse = _refined(ex), ex.noise, _coarse(ex)
+        noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
+        (lib, chosen), coarse = _refined(ex), _coarse(ex)
         turn += 1
         del ex  # hundreds of megabytes, before the next
-    if discrepancy:
-        return explained(turn, BLOCKS)
-    ex = _of_some_weight(explained(turn, BLOCKS))
-    # The last search may have found another set than that whose noise it was weighted by.
-    return explained_by(ex, ex.chosen)
+    ex = explained(turn, BLOCKS)
+    sure, settings = named(ex.space, ex.chosen, ex.settings, ex.sets)
+    return dataclasses.replace(ex, chosen=sure, settings=settings)
 
 
-def _settled(
-    lib: Library, scales: Scales, data: Data, factor: np.ndarray, chosen: tuple[int, ...], noise: Noise | None,
-    blocks: int, *, settled: bool,
-) -> Explanation:  # fmt: skip
-    """Search and noise in turn: noise that the last explanation left may hide an effect that it named wrongly."""
-    # The noise of the round before is nearly right; the first is a guess, under which a full search would take minutes
-    # where there is much structure without a name.
-    rounds = (search,) if noise else (guessed, search)
-    noise = noise or first_noise(data)
-    for find in rounds:
-        prob, g = problem(data, noise, blocks=1, settled=settled)
-        chosen = find(prob, chosen)
-        noise = noise_under(data, prob, chosen, noise, rounds=1)
-        del prob, g  # hundreds of megabytes, before the next are made
-    prob, g = problem(data, noise, blocks, settled=settled)
-    return Explanation(lib, scales, data, noise, chosen, prob, g, search(prob, chosen), factor)
-
-
-def _of_some_weight(ex: Explanation) -> Explanation:
-    """The explanation without what should have a mass and has none, and with what is then found: see `WEIGHTLESS`."""
-    post, weightless = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), set()
-    for c, part in zip(ex.members, parts(ex.data, ex.chosen), strict=True):
-        mass = part.start
-        if c.effect.tied and post.mean[mass] < WEIGHTLESS * np.sqrt(post.cov[mass, mass]):
-            weightless.add((c.slug, c.joints))
-    if not weightless:
-        return ex
-    none = np.array([(c.slug, c.joints) in weightless for c in ex.data.candidates])
-    prob = dataclasses.replace(ex.problem, lowest=np.where(none[:, None], np.inf, ex.problem.lowest))
-    return dataclasses.replace(ex, problem=prob, chosen=search(prob, tuple(i for i in ex.chosen if not none[i])))
-
-
-def _named(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
+def _physics(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
     """The effects of an explanation (see `fitted`) with their numbers."""
     _, members, amplitudes = found
     return [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
@@ -195,7 +151,7 @@ def _grid_of(ex: Explanation, mine: Candidate) -> tuple[np.ndarray, np.ndarray]:
     """A member's grid, shape (points, shape parameters), and log odds of its points beside the other members."""
     candidates, site = ex.data.candidates, (mine.slug, mine.joints, mine.variant)
     same = [i for i, c in enumerate(candidates) if (c.slug, c.joints, c.variant) == site]
-    odds = ex.problem.scores(tuple(c for c in ex.chosen if c not in same))[same]
+    odds = ex.gains(tuple(c for c in ex.chosen if c not in same), same)
     return np.array([candidates[i].shape for i in same]), odds
 
 

@@ -62,8 +62,8 @@ def nuisances(
         for j in range(n):
             rotor = ROTOR * float(robot.armature[j]) * motion.qdd[:, j]
             fixed = np.stack([GAIN_JOINT * load[:, j], DELAY_JOINT * rate[:, j], rotor, bend[:, j]], axis=1)
-            slope = np.zeros((len(motion.t), count))
-            slope[:, r] = motion.direction[:, j]
+            slope = np.zeros((len(motion.t), count if count > 1 else 0))  # of one alone, it is the level itself
+            slope[:, r : r + 1] = motion.direction[:, [j]][:, : slope.shape[1]]
             features = [f(motion, load, scales, j) for f in (smooth_features, reversal_features)]
             joints.append([band.apply(b) for b in (fixed, *features, slope)])
         raw.append(joints)
@@ -74,7 +74,7 @@ def nuisances(
             rows = sum(len(raw[r][j][block]) for r in range(count))
             rms = np.sqrt(power / rows)
             gone = rms < 1e-9 * np.max(rms, initial=1e-300)
-            width = raw[0][j][block].shape[1]
+            width = max(raw[0][j][block].shape[1], 1)
             # Slopes are shares of a friction level; a discrepancy of size one is as large as the torque.
             size = scales.torque[j] / (1.0 if block == 3 else np.sqrt(width))
             factor = np.where(gone, 0.0, size / np.where(gone, 1.0, 1.0 if block == 3 else rms))

@@ -22,7 +22,14 @@ class Search:
 
     def __init__(self, space: Space, settings: Settings):
         self.space, self.start = space, settings
+        alone = len(space.joints) == 1
+        whole = [len(c.joints) == len(space.joints) and not alone for c in space.candidates]
+        self._sites = [[i for i, c in enumerate(space.candidates) if j in c.joints and not whole[i]]
+                       for j in range(len(space.joints))]  # fmt: skip
+        self._sites.append([i for i, w in enumerate(whole) if w])
         self.visited: dict[frozenset[int], tuple[float, Settings]] = {}
+        self._screened: dict[tuple[int, frozenset[int]], list[tuple[float, int]]] = {}
+        self._in_vain: set[tuple[tuple[int, ...], frozenset[int]]] = set()
 
     def judged(self, chosen: Iterable[int], settings: Settings, joints: Iterable[int] | None = None) -> float:
         """Log posterior of a set, its settings fitted from some near ones."""
@@ -39,14 +46,19 @@ class Search:
         moves: tuple[Callable[[frozenset[int]], frozenset[int]], ...] = (
             self._added, self._removed, self._exchanged, self._on_all_joints, self._ordinary,
         )  # fmt: skip
-        moving = True
-        while moving:
-            moving = False
-            for move in moves:
-                while (better := move(now)) != now:
-                    now, moving = better, True
-                    self.visited[now] = self.space.settled(tuple(sorted(now)), self.visited[now][1])
-        return tuple(sorted(now))
+        while True:
+            before, moving = now, True
+            while moving:
+                moving = False
+                for move in moves:
+                    while (better := move(now)) != now:
+                        now, moving = better, True
+                        self.visited[now] = self.space.settled(tuple(sorted(now)), self.visited[now][1])
+            # What was tried in vain beside other sets at other joints counts in the averages beside this one.
+            self._in_vain.clear()
+            self._screened.clear()
+            if now == before:
+                return tuple(sorted(now))
 
     def _value(self, chosen: frozenset[int]) -> float:
         return self.visited[chosen][0]
@@ -60,25 +72,40 @@ class Search:
         return best
 
     def screened(self, chosen: frozenset[int], joint: int, most: int = BEST) -> list[int]:
-        """The most promising candidates at a joint beside a set, the best of each kind and site."""
-        return [i for _, i in self._scored(chosen, joint)[:most]]
+        """The most promising candidates at a joint beside a set, the best of each kind and site.
+
+        The number after the last joint's stands for effects of the whole arm.
+        """
+        bad = self.space.conflicts(tuple(chosen))
+        return [i for _, i in self._scored(chosen, joint) if not bad[i] and i not in chosen][:most]
 
     def _scored(self, chosen: frozenset[int], joint: int) -> list[tuple[float, int]]:
         """Log posterior of a set with each kind of candidate at a joint, best first, and the candidate.
 
         By the set's own settings or by those with less discrepancy and noise, whichever makes more of them.
         """
+        near = frozenset(m for m in chosen if joint in self.space.candidates[m].joints)
+        if (joint, near) not in self._screened or joint == len(self.space.joints):
+            self._screened[joint, near] = self._scored_anew(chosen, joint)
+        return self._screened[joint, near]
+
+    def _scored_anew(self, chosen: frozenset[int], joint: int) -> list[tuple[float, int]]:
         space, settings = self.space, self.visited[chosen][1]
         bad = space.conflicts(tuple(chosen))
-        which = np.array([i for i in space.touching[joint] if not bad[i] and i not in chosen], dtype=int)
+        which = np.array([i for i in self._sites[joint] if not bad[i] and i not in chosen], dtype=int)
         if not len(which):
             return []
-        own = settings[joint]
-        lower = tuple(max(k - 2, 0) for k in own)
-        lowest = (*(min(k, 1) for k in own[:-1]), max(own[-1] - 6, 0))
         best = np.full(len(which), -np.inf)
-        for other in dict.fromkeys((own, lower, lowest)):
-            trial = (*settings[:joint], other, *settings[joint + 1 :])
+        joints = [joint] if joint < len(space.joints) else range(len(space.joints))
+        lower = tuple(
+            ((*(max(k - 2, 0) for k in own[:-1]), max(own[-1] - 2, space.joints[j].lowest)) if j in joints else own)
+            for j, own in enumerate(settings)
+        )
+        lowest = tuple(
+            ((*(min(k, 1) for k in own[:-1]), max(own[-1] - 6, space.joints[j].lowest)) if j in joints else own)
+            for j, own in enumerate(settings)
+        )
+        for trial in dict.fromkeys((settings, lower, lowest)):
             base = space.log_evidence(tuple(chosen), trial)
             if np.isfinite(base):
                 best = np.maximum(best, base + space.gains(tuple(chosen), trial, which))
@@ -93,7 +120,7 @@ class Search:
         return {j for m in members for j in self.space.candidates[m].joints}
 
     def _added(self, now: frozenset[int]) -> frozenset[int]:
-        tries = {i for j in range(len(self.space.joints)) for i in self.screened(now, j, 2)}
+        tries = {i for j in range(len(self._sites)) for i in self.screened(now, j, 2)}
         return self._best(now, ((now | {i}, self._joints(i)) for i in tries))
 
     def _removed(self, now: frozenset[int]) -> frozenset[int]:
@@ -101,11 +128,15 @@ class Search:
 
     def _exchanged(self, now: frozenset[int]) -> frozenset[int]:
         """One or two members at a joint for one or two others there."""
+        space = self.space
         for drop in [*((c,) for c in now), *self._pairs(now)]:
             rest, joints = now - set(drop), self._joints(*drop)
+            beside = drop, frozenset(m for m in now if self._joints(m) & joints)
+            if beside in self._in_vain:
+                continue
             self.judged(rest, self.visited[now][1], joints)
             others: list[tuple[frozenset[int], set[int]]] = []
-            for j in sorted(joints):
+            for j in (*sorted(joints), len(space.joints)):
                 for i in self.screened(rest, j):
                     one = rest | {i}
                     others.append((one, joints | self._joints(i)))
@@ -114,6 +145,7 @@ class Search:
                         others += [(one | {k}, joints | self._joints(i, k)) for k in self.screened(one, j, 1)]
             if (better := self._best(now, others)) != now:
                 return better
+            self._in_vain.add(beside)
         return now
 
     def _pairs(self, now: frozenset[int]) -> list[tuple[int, int]]:
@@ -127,8 +159,8 @@ class Search:
             rest = frozenset(m for m in now if self._of(m).slug != slug)
             without = self.judged(rest, self.visited[now][1])
             gained: dict[str, dict[int, tuple[float, int]]] = {}
-            for j in range(len(space.joints)):
-                for value, i in self._scored(rest, j):
+            for j in range(len(self._sites)):
+                for value, i in self._scored_anew(rest, j):
                     place = j if len(self._of(i).joints) == 1 else -1
                     best = gained.setdefault(self._of(i).slug, {})
                     best[place] = max(best.get(place, (0.0, i)), (value - without, i))
@@ -142,7 +174,7 @@ class Search:
         tries = []
         for j in range(len(self.space.joints)):
             rubs = {m for m in now if self._of(m).effect.friction and self._of(m).joints == (j,)}
-            usual = {i for i in self.space.touching[j] if self._of(i).effect.ordinary and self._of(i).joints == (j,)}
+            usual = {i for i in self._sites[j] if self._of(i).effect.ordinary and self._of(i).joints == (j,)}
             tries += [(now - rubs | usual, [j]), *((now - rubs | {i}, [j]) for i in usual)]
         return self._best(now, tries)
 
