@@ -29,7 +29,7 @@ def consistent(phi: np.ndarray, nominal: np.ndarray) -> np.ndarray:
         values, vectors = np.linalg.eigh(inverse @ pseudo_inertia(new) @ inverse.T)
         if values.min() < LEAST:
             root = L @ vectors
-            out[i] = _parameters(root @ np.diag(np.maximum(values, LEAST)) @ root.T)
+            out[i] = parameters(root @ np.diag(np.maximum(values, LEAST)) @ root.T)
     return out
 
 
@@ -45,7 +45,7 @@ def pseudo_inertia(phi: np.ndarray) -> np.ndarray:
     return J
 
 
-def _parameters(J: np.ndarray) -> np.ndarray:
+def parameters(J: np.ndarray) -> np.ndarray:
     """The inverse of `pseudo_inertia`."""
     inertia = np.trace(J[:3, :3]) * np.eye(3) - J[:3, :3]
     return np.concatenate([[J[3, 3]], J[:3, 3], inertia[np.triu_indices(3)]])

@@ -15,12 +15,15 @@ from irb140_jax.mismatch import locate
 from irb140_jax.mismatch.enough import sensor_scatter, torque_size, undecidable
 from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, fitted
-from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding
-from irb140_jax.mismatch.model import CorrectedModel, Named
+from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding, torque_scale_odds
+from irb140_jax.mismatch.model import CorrectedModel, Named, scaled, torques_along
 from irb140_jax.mismatch.native import native_gap
 from irb140_jax.mismatch.notes import gap_notes, notes
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, refitted
 from irb140_jax.mismatch.provenance import provenance
+from irb140_jax.mismatch.regression.discrepancy import Discrepancy
+from irb140_jax.mismatch.regression.nuisances import feature_coefficients
+from irb140_jax.mismatch.selection.selected import NAMED
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
@@ -121,16 +124,16 @@ def _diagnosed(
         )
     scatter = sensor_scatter(robot, recordings, smooth, band)
     ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, scatter, progress)
+    ex = dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= NAMED)
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
     proof = held_out(ex, refit)
     progress("looking for structure that no effect explains")
     rest = unexplained(ex, proof)
     found = findings(robot, ex)
-    model = _model(robot, ex, refit, band, config.known_joints or robot.joint_names)
-    w = ex.posterior(instrument=False).mean * ex.data.scale[ex.columns()]
+    model = _model(robot, ex, refit, proof, band, config.known_joints or robot.joint_names)
     logged = [s.tau for s in ex.data.stretches]
-    corrected = [s.tau - s.y + s.X[..., ex.columns()] @ w for s in ex.data.stretches]
+    corrected = [band.apply(torques_along(model, r).corrected) for r in smooth]
     lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
     gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)
@@ -163,15 +166,22 @@ def _finite(recording: Recording) -> Recording:
     return recording
 
 
-def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band, known: tuple[str, ...]) -> CorrectedModel:
+def _model(
+    robot: Robot, ex: Explanation, refit: Refit, proof: HeldOut, band: Band, known: tuple[str, ...]
+) -> CorrectedModel:
     loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
     refitted_shift, _, _ = fitted(ex.data, refit.posterior(), loose, ex.factor)
-    post = ex.posterior(instrument=False)
+    post, scale, own = ex.prediction()
     dphi, members, amplitudes = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)
-    named = tuple(Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True))
+    named = [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
     phi_refit, phi_corrected = (phi + shift.reshape(phi.shape) for shift in (refitted_shift, dphi))
-    return CorrectedModel(robot, phi_refit, phi_corrected, named, band, ex.scales.rest_speed, known)
+    discrepancy = None
+    if proof.carried.any():
+        discrepancy = Discrepancy(ex.scales, feature_coefficients(ex.extra[0], own, proof.carried))
+    return CorrectedModel(
+        robot, phi_refit, phi_corrected, scaled(robot.n, named, scale), band, ex.scales.rest_speed, known, discrepancy
+    )
 
 
 def _document(

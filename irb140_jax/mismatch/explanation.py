@@ -7,6 +7,7 @@ import numpy as np
 
 from irb140_jax.effects import Scales
 from irb140_jax.mismatch.assemble import Data
+from irb140_jax.mismatch.bodies import of_bodies
 from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.evidence import Posterior
 from irb140_jax.mismatch.noise import Noise
@@ -31,6 +32,7 @@ class Explanation:
         settings: Sizes of the discrepancy and noise levels of each joint beside them.
         sets: Log posterior of every set that the search visited.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
+        scaled: Whether one scale of all logged torques is a finding.
     """
 
     lib: Library
@@ -43,6 +45,7 @@ class Explanation:
     settings: Settings
     sets: Sets
     factor: np.ndarray
+    scaled: bool = False
 
     @property
     def members(self) -> list[Candidate]:
@@ -94,23 +97,49 @@ class Explanation:
             instrument: Whether the instrument may err within its stated widths.  For predictions it is taken to be
                 right but for what is named.
         """
+        mean, cov = self._shared(chosen, without, instrument=instrument)
+        keep = np.r_[0 : self.space.inertials, self.space.offset : len(mean)]
+        return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
+
+    def _shared(
+        self, chosen: tuple[int, ...] | None, without: np.ndarray | None, *, instrument: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and covariance of all shared columns of a set; for predictions, those of possible bodies."""
         chosen = self.chosen if chosen is None else chosen
         space = self.space if without is None else self.space.without(without)
-        mean, cov = space.posterior(chosen, self.settings, instrument=instrument)
-        keep = np.r_[0 : space.inertials, space.offset : len(mean)]
-        return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
+        mean, cov = space.posterior(chosen, self.settings, instrument=instrument, scaled=self.scaled)
+        if instrument:
+            return mean, cov
+        size, robot = space.inertials, self.lib.robot
+        into, first = np.zeros((size, len(mean))), space.offset
+        into[:, :size] = np.diag(self.data.scale[:size])
+        for c in chosen:
+            candidate, width = self.data.candidates[c], len(self.data.candidates[c].columns)
+            if candidate.slug == "inertials":
+                rows = 10 * candidate.joints[0] + np.arange(width)
+                into[rows, first + np.arange(width)] = self.data.scale[self.data.nuisances + candidate.columns]
+            first += width
+        return of_bodies(mean, cov, into, np.asarray(robot.phi), self.factor), cov
 
     def torque_scale(self) -> tuple[float, float]:
         """Logged over real torque of all joints alike, less one: mean and standard deviation."""
-        mean, cov = self.space.posterior(self.chosen, self.settings)
+        mean, cov = self._shared(None, None, instrument=True)
         at = self.space.inertials
         return GAIN_COMMON * float(mean[at]), GAIN_COMMON * float(np.sqrt(cov[at, at]))
 
-    def discrepancy(self, post: Posterior, without: np.ndarray | None = None) -> list[np.ndarray]:
-        """Mean coefficients of each joint's own columns beside a posterior without errors of the instrument."""
+    def prediction(self, without: np.ndarray | None = None) -> tuple[Posterior, float, list[np.ndarray]]:
+        """What predicts: inertials and amplitudes, the torque scale less one, and each joint's own columns.
+
+        Args:
+            without: Which blocks of the data are left out, shape (blocks,).
+        """
         space = self.space if without is None else self.space.without(without)
-        at = np.where(post.columns < space.inertials, post.columns, post.columns + space.offset - space.inertials)
-        return [space.own(j, s, at, post.mean, instrument=False) for j, s in enumerate(self.settings)]
+        mean, cov = self._shared(None, without, instrument=False)
+        columns = space.set_columns(self.chosen)
+        own = [space.own(j, s, columns, mean, instrument=False) for j, s in enumerate(self.settings)]
+        keep = np.r_[0 : space.inertials, space.offset : len(mean)]
+        post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
+        return post, GAIN_COMMON * float(mean[space.inertials]), own
 
     def probability(self, index: int) -> float:
         """Of a chosen candidate's effect at its joints, over all sets visited."""

@@ -12,7 +12,6 @@ from irb140_jax.mismatch.explanation import Explanation, parts
 from irb140_jax.mismatch.intervals import parameters_of
 from irb140_jax.mismatch.prove import held_out_gain
 from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
-from irb140_jax.mismatch.selection.selected import NAMED
 from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.robot import Robot
@@ -49,17 +48,25 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     return sorted(out, key=lambda f: -f["evidence"]["log_odds"])
 
 
-def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
-    """The torque of all joints logged too large or too small by one factor, where that is probable.
+def torque_scale_odds(ex: Explanation) -> tuple[float, float]:
+    """Log odds that one scale of all torques is off, and its probability.
 
     A nuisance parameter with a stated prior.  Its odds are the ratio of prior and posterior density where it is zero
     (Savage and Dickey) times the prior odds of any rare effect.
     """
     w, std = ex.torque_scale()
     odds = stats.norm.logpdf(0.0, 0.0, GAIN_COMMON) - stats.norm.logpdf(0.0, w, std) + np.log(RARE)
-    probability = float(special.expit(odds))
-    if probability < NAMED:
+    return float(odds), float(special.expit(odds))
+
+
+def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
+    """The torque of all joints logged too large or too small by one factor, where that is probable.
+
+    """
+    odds, probability = torque_scale_odds(ex)
+    if not ex.scaled:
         return []
+    w, std = ex.torque_scale()
     gain, spread, way = 1.0 / (1.0 + w), std / (1.0 + w) ** 2, "large" if w > 0 else "small"
     return [{
         "effect": "torque_gain",
@@ -67,7 +74,7 @@ def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         "where": f"all joints: in proportion to the torque of the links; the real torque is {gain:.3g} x the logged",
         "parameters": {"gain": {"value": gain, "std": spread, "unit": "1"}},
         # Without it the inertials stand in for it, as wrong as that takes: on unseen data it is worth nothing.
-        "evidence": {"log_odds": float(odds), "probability": probability, "heldout_gain": 0.0},
+        "evidence": {"log_odds": odds, "probability": probability, "heldout_gain": 0.0},
         "certain": (
             f"The torque of all joints is logged {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} for the stated "
             "masses; only a known payload tells wrong torque constants from masses all wrong alike."

@@ -8,6 +8,7 @@ from irb140_jax.mismatch.assemble import BLOCKS
 from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
 from irb140_jax.mismatch.explanation import Explanation, parts
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
+from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
 from irb140_jax.mismatch.rows import Stretch
 
 ALONE = 0.8  # share of a joint's usable rows, or of a finding's torque, beside which the others say nothing of it
@@ -128,8 +129,7 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     out["flexible"] = [s.y.copy() for s in data.stretches]
     better = np.ones(len(ex.settings), dtype=bool)
     for fold in folds(ex):
-        post = ex.posterior(without=fold, instrument=False)
-        own = ex.discrepancy(post, fold)
+        post, scale, own = ex.prediction(fold)
         corrected = np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean) * data.scale[post.columns]
         inertial = refit.posterior(fold).mean * data.scale[refit.columns]
         gain = np.zeros(len(better))
@@ -140,6 +140,7 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
                 rows = slice(edges[b], edges[b + 1])
                 out["refit"][r][rows] -= bare[r].X[rows] @ inertial
                 out["named"][r][rows] -= s.X[rows][..., post.columns] @ corrected
+                out["named"][r][rows] -= scale / GAIN_COMMON * ex.extra[r].common[rows, :, 0]
                 delta = np.stack([x[rows] @ v for x, v in zip(ex.extra[r].own, own, strict=True)], axis=1)
                 out["flexible"][r][rows] = out["named"][r][rows] - delta
                 old, new = (np.where(s.use[rows], out[k][r][rows], 0.0) for k in ("named", "flexible"))

@@ -9,6 +9,9 @@ Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(
 and Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
 """
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 
 from irb140_jax.effects import Scales
@@ -19,6 +22,43 @@ ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which a sign is rou
 LATE = (-0.01, -0.005, 0.005, 0.01, 0.02)  # s by which friction turns before or after the joint
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
+
+
+@dataclasses.dataclass(frozen=True)
+class Discrepancy:
+    """What a corrected model adds, on some joints, to what its laws say: torque without a name.
+
+    Attributes:
+        scales: Sizes of the recordings that it was found in.
+        coefficients: Of each joint's smooth and reversal features [N m or N], zero where nothing is carried, (n, 82).
+    """
+
+    scales: Scales
+    coefficients: np.ndarray
+
+    def along(self, r: Conditioned, load: np.ndarray) -> np.ndarray:
+        """Its torque along a motion, shape (T, n) [N m or N].
+
+        Args:
+            r: T samples of n joints.
+            load: Torque that the transmissions carry [N m or N], shape (T, n).
+        """
+        out = np.zeros_like(load)
+        for j in np.flatnonzero(self.coefficients.any(axis=1)):
+            features = [f(r, load, self.scales, int(j)) for f in (smooth_features, reversal_features)]
+            out[:, j] = np.concatenate(features, axis=1) @ self.coefficients[j]
+        return out
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything of it as JSON."""
+        sizes = {k: np.asarray(v).tolist() for k, v in self.scales._asdict().items()}
+        return {"scales": sizes, "coefficients": self.coefficients.tolist()}
+
+    @staticmethod
+    def from_json(data: dict[str, Any]) -> "Discrepancy":
+        """The inverse of `to_json`."""
+        sizes = {k: np.array(v, dtype=float) if isinstance(v, list) else float(v) for k, v in data["scales"].items()}
+        return Discrepancy(Scales(**sizes), np.array(data["coefficients"], dtype=float))
 
 
 def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:

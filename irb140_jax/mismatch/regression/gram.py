@@ -185,8 +185,8 @@ def joint_grams(
         sensors: What of the noise the sensors make, shape (n,) [N m or N]; all of it by default.
     """
     total = np.sqrt(np.mean(noise.total**2, axis=0))
-    share = np.ones(len(total)) if sensors is None else np.minimum(sensors / total, 1.0) ** 2
-    form = partial(_joint_gram, data, extra, noise, blocks, 1.0 - share)
+    misfit = np.zeros(len(total)) if sensors is None else 1.0 - np.minimum(sensors / total, 1.0) ** 2
+    form = partial(_joint_gram, data, extra, noise, blocks, misfit)
     # Joints side by side: nearly all of the time is in products, and those hold no lock.
     with ThreadPoolExecutor() as threads:
         return tuple(threads.map(form, range(len(total))))
@@ -214,4 +214,29 @@ def _joint_gram(
             out.append(part.T @ part)
             count.append(len(part))
             repeats.append(s.repeats)
-    return JointGram(index, np.stack(out), extra[0].groups[j], np.array(count), np.array(repeats), float(misfit[j]))
+    # What the sensors make is independent from row to row; what a model errs by is as long alike as the torque is.
+    rows_alike = 1.0 + float(misfit[j]) * (correlation_time([s.tau[:, j] for s in data.stretches]) - 1.0)
+    return JointGram(
+        index, np.stack(out) / rows_alike, extra[0].groups[j], np.array(count) / rows_alike, np.array(repeats),
+        float(misfit[j]),
+    )  # fmt: skip
+
+
+def correlation_time(series: Sequence[np.ndarray]) -> float:
+    """Rows over which signals of one kind are alike: the sum of their autocorrelation up to its first zero, twice.
+
+    Args:
+        series: Shape (R,) each.
+
+    Source: Priestley, Spectral Analysis and Time Series, 1981, sec. 5.3: variance of the mean of a stationary process.
+    """
+    lags = max(len(x) for x in series)
+    products = np.zeros(lags)
+    for x in series:
+        spectrum = np.abs(np.fft.rfft(x - x.mean(), 2 * len(x))) ** 2
+        products[: len(x)] += np.fft.irfft(spectrum)[: len(x)]
+    if products[0] <= 0.0:
+        return 1.0
+    alike = products / products[0]
+    crossing = int(np.argmax(alike <= 0.0)) or lags
+    return float(max(2.0 * alike[:crossing].sum() - 1.0, 1.0))

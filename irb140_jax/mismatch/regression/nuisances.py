@@ -26,11 +26,27 @@ class Nuisances:
         common: Torque scale and delay of all joints, shape (R, n, 2).
         own: Of each joint, fixed widths first, then the blocks `SCALED`; shape (R, D_j) each.
         groups: Which block each own column belongs to: -1 fixed, else an index into `SCALED`; shape (D_j,) each.
+        units: What each own column's feature was multiplied by, shape (D_j,) each.
     """
 
     common: np.ndarray
     own: tuple[np.ndarray, ...]
     groups: tuple[np.ndarray, ...]
+    units: tuple[np.ndarray, ...]
+
+
+def feature_coefficients(extra: Nuisances, own: Sequence[np.ndarray], joints: np.ndarray) -> np.ndarray:
+    """Coefficients of the discrepancy's features themselves, zero but at some joints, shape (n, 82).
+
+    Args:
+        extra: Of any recording.
+        own: Coefficients of each joint's own columns.
+        joints: At which joints, shape (n,).
+    """
+    return np.stack([
+        np.where(use, v[(g == 0) | (g == 1)] * u[(g == 0) | (g == 1)], 0.0)
+        for use, v, g, u in zip(joints, own, extra.groups, extra.units, strict=True)
+    ])  # fmt: skip
 
 
 def nuisances(
@@ -68,7 +84,9 @@ def nuisances(
             joints.append([band.apply(b) for b in (fixed, *features, slope)])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
+    units = []
     for j in range(n):
+        factors = [np.ones(raw[0][j][0].shape[1])]
         for block in range(1, 4):
             power = sum(np.sum(raw[r][j][block] ** 2, axis=0) for r in range(count))
             rows = sum(len(raw[r][j][block]) for r in range(count))
@@ -78,10 +96,12 @@ def nuisances(
             # Slopes are shares of a friction level; a discrepancy of size one is as large as the torque.
             size = scales.torque[j] / (1.0 if block == 3 else np.sqrt(width))
             factor = np.where(gone, 0.0, size / np.where(gone, 1.0, 1.0 if block == 3 else rms))
+            factors.append(factor)
             for r in range(count):
                 raw[r][j][block] = raw[r][j][block] * factor
+        units.append(np.concatenate(factors))
         group = np.repeat([-1, 0, 1, 2], [raw[0][j][b].shape[1] for b in range(4)])
         for r in range(count):
             out[r][0].append(np.concatenate(raw[r][j], axis=1))
             out[r][1].append(group)
-    return [Nuisances(c, tuple(own), tuple(g)) for c, (own, g) in zip(commons, out, strict=True)]
+    return [Nuisances(c, tuple(own), tuple(g), tuple(units)) for c, (own, g) in zip(commons, out, strict=True)]

@@ -144,7 +144,7 @@ class Space:
         return float(sum(self.log_prior[c] for c in chosen))
 
     def posterior(
-        self, chosen: Sequence[int], settings: Settings, *, instrument: bool = True
+        self, chosen: Sequence[int], settings: Settings, *, instrument: bool = True, scaled: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
         """Mean and covariance of inertials, common nuisances and amplitudes, in prior units.
 
@@ -153,11 +153,13 @@ class Space:
         Args:
             chosen: The set.
             settings: Sizes and levels.
-            instrument: Whether the instrument may err within its stated widths; otherwise its part is zero.
+            instrument: Whether the instrument may err within its stated widths; otherwise its part is zero ...
+            scaled: ... but for one scale of all torques, the first of the common nuisances.
         """
         every = self.with_y(self.set_columns(chosen))
         free = np.ones(len(every) - 1, dtype=bool)
         free[self.inertials : self.offset] = instrument
+        free[self.inertials] |= scaled
         H = self.gram(settings, every, every, instrument=instrument)
         at = np.flatnonzero(free)
         mean, cov = np.zeros(len(free)), np.zeros((len(free), len(free)))

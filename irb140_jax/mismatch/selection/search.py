@@ -40,8 +40,8 @@ class Search:
         return self.visited[key][0]
 
     def run(self, chosen: Iterable[int] = ()) -> tuple[int, ...]:
-        """The best set that no move improves."""
-        now = frozenset(chosen)
+        """The best set that no move improves, from a set or from ordinary friction at all joints."""
+        now = frozenset(chosen or (i for i, c in enumerate(self.space.candidates) if c.effect.ordinary))
         self.judged(now, self.start)
         moves: tuple[Callable[[frozenset[int]], frozenset[int]], ...] = (
             self._added, self._removed, self._exchanged, self._on_all_joints, self._ordinary,
@@ -136,6 +136,10 @@ class Search:
                 continue
             self.judged(rest, self.visited[now][1], joints)
             others: list[tuple[frozenset[int], set[int]]] = []
+            bad = space.conflicts(tuple(rest))
+            special = [i for i in self._special(drop) if not bad[i]]
+            others += [(rest | {i}, joints) for i in special]
+            others += [(rest | set(p), joints) for p in itertools.combinations(special, 2) if self._together(*p)]
             for j in (*sorted(joints), len(space.joints)):
                 for i in self.screened(rest, j):
                     one = rest | {i}
@@ -147,6 +151,18 @@ class Search:
                 return better
             self._in_vain.add(beside)
         return now
+
+    def _special(self, members: tuple[int, ...]) -> list[int]:
+        """Special cases of laws, and ordinary friction in the place of any friction."""
+        out = []
+        for law in map(self._of, members):
+            out += [i for i, c in enumerate(self.space.candidates) if c.joints == law.joints and i not in members
+                    and (c.slug in law.effect.contains or (c.effect.ordinary and law.effect.friction))]  # fmt: skip
+        return sorted(set(out))
+
+    def _together(self, one: int, other: int) -> bool:
+        """Whether two candidates can stand side by side."""
+        return not self.space.conflicts((one,))[other]
 
     def _pairs(self, now: frozenset[int]) -> list[tuple[int, int]]:
         return [p for p in itertools.combinations(sorted(now), 2) if self._joints(p[0]) & self._joints(p[1])]
