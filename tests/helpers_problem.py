@@ -1,10 +1,10 @@
 """Small search problems of a few laws whose torques are given row by row."""
 
 import numpy as np
+from irb140_jax.mismatch.problem import Problem
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.problem import Problem
 from irb140_jax.mismatch.silent import SILENT
 
 ROWS = 80

@@ -36,7 +36,7 @@ def test_encoder_noise_counts_where_torque_is_exact():
 def proof(left: float, rows: int = 2000) -> HeldOut:
     """Errors of this size on a joint, on so many rows."""
     error = np.full((rows, 1), left)
-    return HeldOut([error], [error], [error], [np.ones((rows, 1), dtype=bool)], np.ones(1))
+    return HeldOut([error], [error], [error], [error], [np.ones((rows, 1), dtype=bool)], np.zeros(1, dtype=bool))
 
 
 @pytest.mark.parametrize(

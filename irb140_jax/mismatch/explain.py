@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect, Scales
+from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
 from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble

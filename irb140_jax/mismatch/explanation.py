@@ -97,49 +97,44 @@ class Explanation:
             instrument: Whether the instrument may err within its stated widths.  For predictions it is taken to be
                 right but for what is named.
         """
-        mean, cov = self._shared(chosen, without, instrument=instrument)
-        keep = np.r_[0 : self.space.inertials, self.space.offset : len(mean)]
-        return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
-
-    def _shared(
-        self, chosen: tuple[int, ...] | None, without: np.ndarray | None, *, instrument: bool
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and covariance of all shared columns of a set; for predictions, those of possible bodies."""
         chosen = self.chosen if chosen is None else chosen
         space = self.space if without is None else self.space.without(without)
         mean, cov = space.posterior(chosen, self.settings, instrument=instrument, scaled=self.scaled)
-        if instrument:
-            return mean, cov
-        size, robot = space.inertials, self.lib.robot
-        into, first = np.zeros((size, len(mean))), space.offset
-        into[:, :size] = np.diag(self.data.scale[:size])
-        for c in chosen:
-            candidate, width = self.data.candidates[c], len(self.data.candidates[c].columns)
-            if candidate.slug == "inertials":
-                rows = 10 * candidate.joints[0] + np.arange(width)
-                into[rows, first + np.arange(width)] = self.data.scale[self.data.nuisances + candidate.columns]
-            first += width
-        return of_bodies(mean, cov, into, np.asarray(robot.phi), self.factor), cov
+        keep = np.r_[0 : self.space.inertials, self.space.offset : len(mean)]
+        return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
 
     def torque_scale(self) -> tuple[float, float]:
         """Logged over real torque of all joints alike, less one: mean and standard deviation."""
-        mean, cov = self._shared(None, None, instrument=True)
+        mean, cov = self.space.posterior(self.chosen, self.settings)
         at = self.space.inertials
         return GAIN_COMMON * float(mean[at]), GAIN_COMMON * float(np.sqrt(cov[at, at]))
 
     def prediction(self, without: np.ndarray | None = None) -> tuple[Posterior, float, list[np.ndarray]]:
-        """What predicts: inertials and amplitudes, the torque scale less one, and each joint's own columns.
+        """What predicts: inertials of possible bodies and amplitudes, the torque scale less one, each joint's own columns.
 
         Args:
             without: Which blocks of the data are left out, shape (blocks,).
         """
         space = self.space if without is None else self.space.without(without)
-        mean, cov = self._shared(None, without, instrument=False)
+        mean, cov = space.posterior(self.chosen, self.settings, instrument=False, scaled=self.scaled)
+        mean = of_bodies(mean, cov, self._into_inertials(len(mean)), np.asarray(self.lib.robot.phi), self.factor)
         columns = space.set_columns(self.chosen)
         own = [space.own(j, s, columns, mean, instrument=False) for j, s in enumerate(self.settings)]
         keep = np.r_[0 : space.inertials, space.offset : len(mean)]
         post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
         return post, GAIN_COMMON * float(mean[space.inertials]), own
+
+    def _into_inertials(self, width: int) -> np.ndarray:
+        """From the shared columns of the chosen set to relative errors of the inertials, shape (10 n, width)."""
+        size, first = self.space.inertials, self.space.offset
+        into = np.zeros((size, width))
+        into[:, :size] = np.diag(self.data.scale[:size])
+        for c in self.members:
+            own = first + np.arange(len(c.columns))
+            if c.slug == "inertials":
+                into[10 * c.joints[0] + np.arange(len(own)), own] = self.data.scale[self.data.nuisances + c.columns]
+            first += len(own)
+        return into
 
     def probability(self, index: int) -> float:
         """Of a chosen candidate's effect at its joints, over all sets visited."""

@@ -10,7 +10,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.certain import certain
 from irb140_jax.mismatch.explanation import Explanation, parts
 from irb140_jax.mismatch.intervals import parameters_of
-from irb140_jax.mismatch.prove import held_out_gain
+from irb140_jax.mismatch.prove import held_out_gains
 from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
 from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.mismatch.silent import SILENT
@@ -24,7 +24,7 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     post = ex.posterior()
     w = post.mean * ex.data.scale[post.columns]
     cov = post.cov * np.outer(ex.data.scale[post.columns], ex.data.scale[post.columns])
-    out = []
+    out, gains = [], held_out_gains(ex)
     for index, rows in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
         c = ex.data.candidates[index]
         if c.effect.silent:
@@ -40,9 +40,9 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
             "evidence": {
                 "log_odds": _log_odds(ex, index),
                 "probability": ex.probability(index),
-                "heldout_gain": held_out_gain(ex, index),
+                "heldout_gain": gains[index],
             },
-            "certain": certain(robot, ex, index, w[rows], cov[rows, rows]),
+            "certain": certain(robot, ex, index, w[rows], cov[rows, rows], gains[index]),
             "alternatives": _alternatives(ex, index),
         })  # fmt: skip
     return sorted(out, key=lambda f: -f["evidence"]["log_odds"])

@@ -151,12 +151,20 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     return HeldOut(nominal, out["refit"], out["named"], carried, use, better)
 
 
-def unseen_error(ex: Explanation, chosen: tuple[int, ...]) -> float:
+def held_out_gains(ex: Explanation) -> dict[int, float]:
+    """Share of the whitened squared error on unseen data, noise included, that each finding removes."""
+    left_out = folds(ex)
+    whole = _unseen_error(ex, ex.chosen, left_out)
+    without = {i: _unseen_error(ex, ex.others(i), left_out) for i in ex.chosen}
+    return {i: (error - whole) / max(error, 1e-300) for i, error in without.items()}
+
+
+def _unseen_error(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> float:
     """Whitened squared error of a set on data that its fit did not see."""
     space, error, energy = ex.space, 0.0, _energy(ex, chosen)
     columns = space.with_y(space.set_columns(chosen))
     seen = ex.posterior(chosen, instrument=False).mean
-    for fold in folds(ex):
+    for fold in left_out:
         only = _only_here(ex, chosen, energy, fold)
         mean = np.where(only, seen, ex.posterior(chosen, fold, instrument=False).mean)
         w = np.zeros(len(columns))
@@ -174,9 +182,3 @@ def _only_here(ex: Explanation, chosen: tuple[int, ...], energy: np.ndarray, fol
     alone = energy[:, fold].sum(axis=1) > ALONE * energy.sum(axis=1)
     each = [np.full(len(c.columns), c.effect.once or a) for c, a in zip(members, alone, strict=True)]
     return np.concatenate([np.zeros(ex.data.nuisances, dtype=bool), *each])
-
-
-def held_out_gain(ex: Explanation, without: int) -> float:
-    """Share of the whitened squared error on unseen data, noise included, that a finding removes."""
-    rest = unseen_error(ex, ex.others(without))
-    return (rest - unseen_error(ex, ex.chosen)) / max(rest, 1e-300)
