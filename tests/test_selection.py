@@ -8,7 +8,8 @@ from scipy import signal, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.regression.gram import LEVELS, ONE, SIZES, JointGram, correlation_time, log_prior, own_scale
+from irb140_jax.mismatch.noise import correlation_time
+from irb140_jax.mismatch.regression.gram import LEVELS, ONE, SIZES, JointGram, log_prior, own_scale
 from irb140_jax.mismatch.selection.averages import probabilities
 from irb140_jax.mismatch.selection.evidence import Space
 from irb140_jax.mismatch.selection.search import Search

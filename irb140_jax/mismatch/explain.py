@@ -8,7 +8,7 @@ import numpy as np
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
-from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble
+from irb140_jax.mismatch.assemble import BLOCKS, assemble
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.explanation import Explanation, fitted
 from irb140_jax.mismatch.model import Named, better_known, composed
@@ -91,7 +91,9 @@ def explain(
         along, at = [seen_by(better, r) for r in along], point(robot, found[0], physics)
         loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
         noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
-        (lib, chosen), coarse = _refined(ex), _coarse(ex)
+        # A first grid is too coarse for any law to be right: the discrepancy would make all its points alike.
+        coarse = _coarse(ex)
+        lib, chosen = _refined(ex if turn > 1 else _without_discrepancy(ex))
         turn += 1
         del ex  # hundreds of megabytes, before the next
     ex = explained(turn, BLOCKS)
@@ -111,28 +113,36 @@ def _loads(lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarr
     return composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi).loads
 
 
+def _without_discrepancy(ex: Explanation) -> Explanation:
+    """The explanation as if its laws were exact."""
+    return dataclasses.replace(ex, settings=tuple((*(0 for _ in s[:-1]), s[-1]) for s in ex.settings))
+
+
 def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
-    """Finer grids of shapes around the chosen ones, and grids that the residual suggests."""
+    """Finer grids of shapes around the best ones, and grids that the residual suggests; the set with the best shapes."""
     left = left_over(ex.data, ex.columns(), ex.noise.total)
-    shapes = []
+    shapes, best = [], {i: ex.data.candidates[i].shape for i in ex.chosen}
     for effect, sites, old, _ in ex.lib.blocks:
         new = old.copy()
         for s, joints in enumerate(sites):
-            mine = [m for m in ex.members if m.slug == effect.slug and m.joints == tuple(joints)]
+            mine = [i for i in best if (ex.data.candidates[i].slug, ex.data.candidates[i].joints)
+                    == (effect.slug, tuple(joints))]  # fmt: skip
             if mine and effect.refines():
-                new[s] = effect.finer(old[s], _peak(ex, mine[0]))
+                best[mine[0]], peak = _peak(ex, mine[0])
+                new[s] = effect.finer(old[s], peak)
             elif effect.scouts and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)
     refined = reshaped(ex.lib, shapes)
-    return refined, tuple(_same(c, refined, ex.data) for c in ex.chosen)
+    return refined, tuple(_same(ex.data.candidates[i], shape, i, refined) for i, shape in best.items())
 
 
 def _coarse(ex: Explanation) -> bool:
     """Whether the shape of a member is known so well that in some direction its grid has no other point that can be."""
-    for mine in ex.members:
+    for index in ex.chosen:
+        mine = ex.data.candidates[index]
         if mine.effect.refines():
-            grid, odds = _grid_of(ex, mine)
+            grid, odds = _grid_of(ex, index)
             best = odds[np.argmin(np.abs(grid - mine.shape).sum(axis=1))]
             for points in nearest_in_each_direction(grid, mine.shape):
                 beside = np.sort(odds[points][np.isfinite(odds[points])])[-2:]  # the best may be midway between two
@@ -141,28 +151,26 @@ def _coarse(ex: Explanation) -> bool:
     return False
 
 
-def _peak(ex: Explanation, mine: Candidate) -> np.ndarray:
-    """Where a member's grid is at its best beside the other members, to a fraction of its steps."""
-    grid, odds = _grid_of(ex, mine)
-    return mine.effect.peak(grid, mine.shape, odds)
+def _peak(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """The best point of a member's grid, and where the grid is at its best to a fraction of its steps."""
+    mine = ex.data.candidates[index]
+    grid, odds = _grid_of(ex, index)
+    best = grid[np.argmax(odds)] if np.isfinite(odds).any() else mine.shape
+    return best, mine.effect.peak(grid, best, odds)
 
 
-def _grid_of(ex: Explanation, mine: Candidate) -> tuple[np.ndarray, np.ndarray]:
+def _grid_of(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
     """A member's grid, shape (points, shape parameters), and log odds of its points beside the other members."""
-    candidates, site = ex.data.candidates, (mine.slug, mine.joints, mine.variant)
+    candidates, mine = ex.data.candidates, ex.data.candidates[index]
+    site = (mine.slug, mine.joints, mine.variant)
     same = [i for i, c in enumerate(candidates) if (c.slug, c.joints, c.variant) == site]
-    odds = ex.gains(tuple(c for c in ex.chosen if c not in same), same)
-    return np.array([candidates[i].shape for i in same]), odds
+    return np.array([candidates[i].shape for i in same]), ex.gains(ex.others(index), same)
 
 
-def _same(index: int, lib: Library, data: Data) -> int:
-    """The candidate nearest in shape to one of the library before; loose inertials keep their place at the end."""
-    old = data.candidates[index]
-    if old.slug == "inertials":
+def _same(c: Candidate, shape: np.ndarray, index: int, lib: Library) -> int:
+    """The candidate of a library nearest to a shape of one before; loose inertials keep their place at the end."""
+    if c.slug == "inertials":
         return index
-    alike = [
-        (float(np.sum(np.abs(c.shape - old.shape))), i)
-        for i, c in enumerate(lib.candidates)
-        if c.slug == old.slug and c.joints == old.joints and c.variant == old.variant
-    ]
-    return min(alike)[1]
+    site = (c.slug, c.joints, c.variant)
+    alike = [i for i, o in enumerate(lib.candidates) if (o.slug, o.joints, o.variant) == site]
+    return min(alike, key=lambda i: float(np.sum(np.abs(lib.candidates[i].shape - shape))))

@@ -56,7 +56,7 @@ class Questions:
         scale = np.concatenate(
             [np.full(len(self._factor), o.uncertainty), np.full(10 * len(o.loose), LOOSE_STD), o.scale]
         )
-        noise = Noise(o.ar, o.level[None], o.level[None])
+        noise = Noise(o.ar, o.level[None], o.level[None], np.ones(len(o.ar)))
         return grams([dataclasses.replace(rows, X=X)], noise, scale, len(self._always), 1).total()[:-1, :-1]
 
     def margin(self, added: np.ndarray, pair: Pair, *, exact: bool = False) -> float:

@@ -30,7 +30,7 @@ class Discrepancy:
 
     Attributes:
         scales: Sizes of the recordings that it was found in.
-        coefficients: Of each joint's smooth and reversal features [N m or N], zero where nothing is carried, (n, 82).
+        coefficients: Of each joint's smooth and reversal features [N m or N], zero where nothing is carried, (n, 81).
     """
 
     scales: Scales
@@ -62,7 +62,7 @@ class Discrepancy:
 
 
 def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
-    """Smooth functions of one joint's state, shape (T, 41).
+    """Smooth functions of one joint's state, shape (T, 40).
 
     Args:
         r: T samples of n joints.
@@ -77,10 +77,12 @@ def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) ->
     fast = 1.0 + 2.0 * np.log(np.abs(r.qd[:, j]) / scales.speed[j] + 1e-3) / np.log(1e3)
     speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
     turned, even = direction[:, None], np.abs(carried)[:, None]
+    # Of friction that grows with load only how it bends: in proportion is a law of its own.
+    bend = even**2 - even * np.sum(even**3) / max(float(np.sum(even**2)), 1e-300)
     parts = [
         position[:, 1:], turned * position, turned * speed, speed,
         (turned * speed)[:, :, None] * position[:, None, :2],
-        turned * even, turned * even**2, (carried**2)[:, None], carried[:, None] * position[:, :2],
+        turned * bend, (carried**2)[:, None], carried[:, None] * position[:, :2],
         turned * even * position[:, :2], turned * even * speed,
     ]  # fmt: skip
     return np.concatenate([p.reshape(len(x), -1) for p in parts], axis=1)

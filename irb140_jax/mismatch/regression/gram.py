@@ -214,29 +214,7 @@ def _joint_gram(
             out.append(part.T @ part)
             count.append(len(part))
             repeats.append(s.repeats)
-    # What the sensors make is independent from row to row; what a model errs by is as long alike as the torque is.
-    rows_alike = 1.0 + float(misfit[j]) * (correlation_time([s.tau[:, j] for s in data.stretches]) - 1.0)
-    return JointGram(
-        index, np.stack(out) / rows_alike, extra[0].groups[j], np.array(count) / rows_alike, np.array(repeats),
-        float(misfit[j]),
-    )  # fmt: skip
+    # So many rows that are alike count as one.
+    grams, rows = np.stack(out) / noise.alike[j], np.array(count) / noise.alike[j]
+    return JointGram(index, grams, extra[0].groups[j], rows, np.array(repeats), float(misfit[j]))
 
-
-def correlation_time(series: Sequence[np.ndarray]) -> float:
-    """Rows over which signals of one kind are alike: the sum of their autocorrelation up to its first zero, twice.
-
-    Args:
-        series: Shape (R,) each.
-
-    Source: Priestley, Spectral Analysis and Time Series, 1981, sec. 5.3: variance of the mean of a stationary process.
-    """
-    lags = max(len(x) for x in series)
-    products = np.zeros(lags)
-    for x in series:
-        spectrum = np.abs(np.fft.rfft(x - x.mean(), 2 * len(x))) ** 2
-        products[: len(x)] += np.fft.irfft(spectrum)[: len(x)]
-    if products[0] <= 0.0:
-        return 1.0
-    alike = products / products[0]
-    crossing = int(np.argmax(alike <= 0.0)) or lags
-    return float(max(2.0 * alike[:crossing].sum() - 1.0, 1.0))

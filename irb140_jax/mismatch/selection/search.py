@@ -144,9 +144,8 @@ class Search:
                 for i in self.screened(rest, j):
                     one = rest | {i}
                     others.append((one, joints | self._joints(i)))
-                    if len(drop) == 1:
-                        self.judged(one, self.visited[rest][1], joints | self._joints(i))
-                        others += [(one | {k}, joints | self._joints(i, k)) for k in self.screened(one, j, 1)]
+                    self.judged(one, self.visited[rest][1], joints | self._joints(i))
+                    others += [(one | {k}, joints | self._joints(i, k)) for k in self.screened(one, j, 1)]
             if (better := self._best(now, others)) != now:
                 return better
             self._in_vain.add(beside)
