@@ -22,7 +22,7 @@ class Data:
     Attributes:
         stretches: One per recording.
         scale: Prior standard deviation of each column's coefficient, shape (K,).
-        candidates: Library candidates followed by one loose-inertials candidate per link.
+        candidates: Library candidates followed by loose inertials of each link and of all of them.
         nuisances: Number of inertial columns (10 n).
     """
 
@@ -57,16 +57,11 @@ def assemble(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data
             typical[c.columns] = np.where(moves, np.min(typical[c.columns], where=moves, initial=np.inf), 0.0)
     scale = np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
     loose = LooseInertials()
-    extra = [
-        Candidate(
-            loose,
-            (k,),
-            np.zeros(0),
-            lib.size + 10 * k + np.arange(10),
-            tuple(range(10)),
-            np.full(10, -np.inf),
-            np.full(10, np.inf),
-        )
-        for k in range(lib.robot.n)
-    ]
+    alone = [(k,) for k in range(lib.robot.n)]
+    links = [*alone, tuple(range(lib.robot.n))] if lib.robot.n > 1 else alone
+    extra = []
+    for joints in links:
+        columns = lib.size + np.concatenate([10 * k + np.arange(10) for k in joints])
+        free = np.full(len(columns), np.inf)
+        extra.append(Candidate(loose, joints, np.zeros(0), columns, tuple(range(len(columns))), -free, free))
     return Data(out, scale, (*lib.candidates, *extra), nuisances)

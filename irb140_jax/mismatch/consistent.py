@@ -2,6 +2,7 @@
 
 import numpy as np
 
+ROUNDING = 1e-9  # of a pseudo-inertia's largest eigenvalue
 LEAST = 1e-3  # of the nominal mass, along any of its directions: a link thinner than that is rounding
 
 
@@ -31,6 +32,12 @@ def consistent(phi: np.ndarray, nominal: np.ndarray) -> np.ndarray:
             root = L @ vectors
             out[i] = parameters(root @ np.diag(np.maximum(values, LEAST)) @ root.T)
     return out
+
+
+def is_body(phi: np.ndarray) -> bool:
+    """Whether inertial parameters (10,) are those of a body with mass along every direction, beyond rounding."""
+    values = np.linalg.eigvalsh(pseudo_inertia(phi))
+    return bool(values[0] > ROUNDING * values[-1])
 
 
 def pseudo_inertia(phi: np.ndarray) -> np.ndarray:

@@ -132,7 +132,8 @@ class Explanation:
         for c in self.members:
             own = first + np.arange(len(c.columns))
             if c.slug == "inertials":
-                into[10 * c.joints[0] + np.arange(len(own)), own] = self.data.scale[self.data.nuisances + c.columns]
+                rows = (10 * np.array(c.joints)[:, None] + np.arange(10)).ravel()
+                into[rows, own] = self.data.scale[self.data.nuisances + c.columns]
             first += len(own)
         return into
 
@@ -162,7 +163,8 @@ def fitted(
     for i, part in zip(chosen, parts(data, chosen), strict=True):
         c = data.candidates[i]
         if c.slug == "inertials":
-            dphi = dphi + factor[:, 10 * c.joints[0] : 10 * c.joints[0] + 10] @ w[part]
+            rows = (10 * np.array(c.joints)[:, None] + np.arange(10)).ravel()
+            dphi = dphi + factor[:, rows] @ w[part]
         else:
             members.append(c)
             amplitudes.append(w[part])

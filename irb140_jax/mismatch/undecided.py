@@ -134,7 +134,7 @@ def undecided(
     chosen = table.of(physics)
     hidden = table.of(i for z, i in seen.values() if z < VISIBLE)
     table.of(i for _, i in seen.values())
-    links = tuple(ex.data.candidates[c].joints[0] for c in loose)
+    links = tuple(j for c in loose for j in ex.data.candidates[c].joints)
     gram, scale, strength = table.gram(ex, loose, matters)
     # A joint that never moved told nothing of its noise.
     still = np.array([g.rows.sum() == 0 for g in ex.space.joints])

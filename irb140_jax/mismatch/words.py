@@ -55,7 +55,7 @@ def inertial_views(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     dphi, _, _ = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)
     possible = consistent(phi + dphi.reshape(-1, 10), phi)
-    loose = {ex.data.candidates[c].joints[0] for c in ex.chosen if ex.data.candidates[c].slug == "inertials"}
+    loose = {j for m in ex.members if m.slug == "inertials" for j in m.joints}
     uncertainty = ex.data.scale[0] if ex.data.nuisances else 0.05
     known = _masses_known(ex, post.cov)
     out = []

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, special
 
 from irb140_jax.mismatch.beside import Beside
 from irb140_jax.mismatch.candidates import Candidate
@@ -55,10 +55,11 @@ class Space:
     def conflicts(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Candidates that can't stand beside a set, shape (candidates,).
 
-        Beside what `Beside` says: one law a joint holds its level of dry friction, and one puts its log out of time.
+        Beside what `Beside` says: one law a joint holds its level of dry friction, one puts its log out of time, and a
+        link's inertials are loose once.
         """
         out = self.beside.conflicts(chosen)
-        for alike in (self._dry, self._late):
+        for alike in (self._dry, self._late, self._loose):
             taken = np.any(self.at_joint[:, list(chosen)] & alike[list(chosen)], axis=1)
             out = out | (alike & np.any(self.at_joint & taken.reshape(-1, 1), axis=0))
         return out
@@ -78,6 +79,10 @@ class Space:
     @cached_property
     def _late(self) -> np.ndarray:
         return np.array([c.effect.logged > 1 for c in self.candidates])
+
+    @cached_property
+    def _loose(self) -> np.ndarray:
+        return np.array([c.slug == "inertials" for c in self.candidates])
 
     @cached_property
     def places(self) -> tuple[np.ndarray, ...]:
@@ -192,7 +197,7 @@ class Space:
         """Sizes and levels that are best for a set, by ascent on their grids, at some joints or all.
 
         Returns:
-            Log evidence and prior of the set, -inf where it is inadmissible there, and the settings.
+            Log posterior of the set, summed over shapes, -inf where it is inadmissible; and the settings.
         """
         joints = range(len(self.joints)) if joints is None else joints
         index = self.with_y(self.set_columns(chosen))
@@ -203,7 +208,37 @@ class Space:
                 better = self._climbed(index, settings, j)
                 moved |= better != settings and len(joints) > 1
                 settings = better
-        return self.log_evidence(chosen, settings), settings
+        return self.log_evidence(chosen, settings) + self.over_shapes(chosen, settings), settings
+
+    def over_shapes(self, chosen: Sequence[int], settings: Settings) -> float:
+        """What a set's log posterior gains where the shapes of its members are summed over instead of the best ones.
+
+        One member at a time, the others' shapes as they are.
+        """
+        out = 0.0
+        for c in chosen:
+            if len(alike := self._alike[c]) > 1:
+                rest = tuple(i for i in chosen if i != c)
+                near = frozenset(i for i in rest if self.at_joint[list(self.candidates[c].joints), i].any())
+                key = alike[0], near, tuple(settings[j] for j in self.candidates[c].joints)
+                if key not in self._summed:
+                    self._summed[key] = special.logsumexp(self.gains(rest, settings, np.array(alike)))
+                own = self.gains(rest, settings, np.array([c]))[0]
+                out += max(float(self._summed[key] - own), 0.0) if np.isfinite(own) else 0.0
+        return out
+
+    @cached_property
+    def _summed(self) -> dict[tuple, float]:
+        return {}
+
+    @cached_property
+    def _alike(self) -> list[list[int]]:
+        """Candidates that differ from each one in shape alone, itself included."""
+        groups: dict[tuple, list[int]] = {}
+        keys = [(c.slug, c.joints, c.variant) for c in self.candidates]
+        for i, key in enumerate(keys):
+            groups.setdefault(key, []).append(i)
+        return [groups[key] for key in keys]
 
     def _climbed(self, index: np.ndarray, settings: Settings, j: int) -> Settings:
         """The settings with those of one joint at their best beside a set."""

@@ -42,7 +42,7 @@ def space_of(
         # What is there only if it is more than nothing, but moves nothing here, can't be found.
         unseen = (s == 0.0) & (c.lowest == 0.0) | (c.effect.once and _throughout(data, c))
         low, high = c.lowest, c.highest
-        if (s > 0.0).all():
+        if len(c.shape) and (s > 0.0).all():
             at_least, at_most = c.effect.at_shape(c.shape)
             low = np.maximum(low, at_least[list(c.variant)])
             high = np.minimum(high, at_most[list(c.variant)])
@@ -72,14 +72,8 @@ def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
         shape = kinds[c.slug, c.joints] * c.effect.scanned
         return float(np.log(RARE / len(sites[c.slug]) / shape)) + narrowed.get((c.slug, c.joints), 0.0)
 
-    # The last link's inertials and a payload's are one thing under two priors, whose widths mean little: a factor of
-    # three in each of ten parameters.
-    held = any(c.effect.tied and data.scale[data.nuisances + c.columns[0]] > 0.0 for c in data.candidates)
-    last = data.stretches[0].y.shape[1] - 1
-    doubly = [held and c.slug == "inertials" and c.joints == (last,) for c in data.candidates]
     usual = np.log(COMMON / (1.0 - COMMON))
-    out = np.array([usual if c.effect.ordinary else rare(c) for c in data.candidates])
-    return out - 10.0 * np.log(3.0) * np.array(doubly)
+    return np.array([usual if c.effect.ordinary else rare(c) for c in data.candidates])
 
 
 def _narrowed(grid: np.ndarray, first: np.ndarray) -> float:
