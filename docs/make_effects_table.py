@@ -10,7 +10,7 @@ HEAD = """# The effects
 <!-- Written by docs/make_effects_table.py; a test compares the two. -->
 
 What a diagnosis can name today, from the files in `irb140_jax/effects/`; [adding one](adding-an-effect.md) is adding a
-file.  Units are those of a hinge; for a slide read N for N m and m for rad.
+file. Units are those of a hinge; for a slide read N for N m and m for rad.
 """
 
 

@@ -166,22 +166,23 @@ def page(rows: list[dict]) -> str:
     count = lambda key, what: sum(r[key]["state"] == what for r in left)  # noqa: E731
     states = ("named", "open", "not testable", "missed", "wrong")
     lines = [
-        "# Cases left open, and the motion that decides them", "",
-        "Written by `experiments/ambiguous.py` from `results/ambiguous.jsonl`. MuJoCo hides one effect, 8 to 20 % of",
-        "the joint's torque on lively motions, in a random robot, and records two poor motions of 12 s: slow ones,",
-        "small ones, or ones of another joint only. Inertials are 5 % wrong, encoder noise is 2e-5 rad, torque noise",
-        "1 % of the joint's. What the diagnosis leaves open goes to `irb140 excite`; the motion it proposes is played",
-        "by the same arm, and old and new recordings are diagnosed together. For comparison, the poor motion is",
-        "recorded again for as long.", "",
-        f"Of {len(rows)} cases, the poor motions decide {len(rows) - len(left)} at once; {len(left)} stay open:", "",
+        "# Cases left open, and motions that decide them", "",
+        "Written by `experiments/ambiguous.py` from `results/ambiguous.jsonl`. In each case MuJoCo hides one effect",
+        "in a random robot. On fast motions the effect makes 8 to 20 % of the joint's torque. Two poor motions of 12",
+        "s are recorded: slow motions, small motions, or motions of another joint only. Inertials are 5 % wrong,",
+        "encoder noise is 2e-5 rad, and torque noise is 1 % of the joint's torque. If the diagnosis leaves a question",
+        "open, `irb140 excite` designs a motion. The same robot performs it, and the old and the new recordings are",
+        "diagnosed together. For comparison, the poor motion is also recorded again for the same time.", "",
+        f"The poor motions alone decide {len(rows) - len(left)} of {len(rows)} cases. {len(left)} cases stay open:", "",
         "| | " + " | ".join(states) + " |", "|---|" + "---|" * len(states),
         *(
             f"| {label} | " + " | ".join(str(count(key, s)) for s in states) + " |"
             for label, key in LABELS.items()
         ), "",
-        f"*Named*: the hidden effect at its joints with a probability of at least {CERTAIN}, and nothing else. *Open*:",
-        "it is named beside others or with less, or is a stated alternative. *Not testable*: said to be so. *Missed*:",
-        "nothing said. *Wrong*: other effects were named, and it was not said to be in doubt.", "",
+        f"*Named*: the diagnosis names the hidden effect at its joints with a probability of at least {CERTAIN}, and",
+        "nothing else. *Open*: it names the effect with a lower probability, names it beside others, or lists it as",
+        "an alternative. *Not testable*: it says that the motion could not have shown the effect. *Missed*: it does",
+        "not mention the effect. *Wrong*: it names other effects and does not mention the hidden one.", "",
         "## Every case", "",
         "| seed | joints | poor motion | hidden | before | proposed motion | after | found after |",
         "|---|" + "---|" * 7,

@@ -1,4 +1,4 @@
-"""The page of what became of physics hidden by hand, out of what arms_by_hand.py stored; computes nothing."""
+"""Write the page on physics that was hidden by hand, from the results that arms_by_hand.py stored."""
 
 import json
 import pathlib
@@ -10,41 +10,43 @@ from pages import page_of
 
 OPENING = """# Arms and physics by hand
 
-Written by `experiments/arms_by_hand.py` from `results/arms_by_hand_*.jsonl`; don't edit. Six arms (a pendulum, two
-links, SCARA, gantry, cylindrical, seven joints) whose MJCF, control and hidden physics are written in `hand_arms.py`
-and `hand_laws.py`: MuJoCo's own `frictionloss`, `damping`, `armature`, `stiffness` and `gravity` where it has the
-physics. Inertials 5 % wrong, two recordings of 15 s that begin and end in motion, positions with 1e-5 of noise, torques
-with 1 %; effects of 6 to 25 % of the joint's torque, inertials as they are; delays of 6 to 22 ms, lags of 15 to 60 ms,
-zeros off by 0.02 to 0.06, payloads of 0.3 to 1 of the last link. Nothing is left out for being invisible: a zero of a
-vertical slide, or a gain where nothing but inertia acts, can't be seen by anyone.
+Written by `experiments/arms_by_hand.py` from `results/arms_by_hand_*.jsonl`; don't edit. There are six arms: a
+pendulum, two links, SCARA, gantry, cylindrical, and seven joints. Their MJCF, control and hidden physics are written
+by hand in `hand_arms.py` and `hand_laws.py`. Where MuJoCo has the physics, its own `frictionloss`, `damping`,
+`armature`, `stiffness` and `gravity` are used. Inertials are 5 % wrong. There are two recordings of 15 s that begin
+and end in motion. The noise is 1e-5 on positions and 1 % on torques. Effects make 6 to 25 % of the joint's torque.
+Delays are 6 to 22 ms, lags 15 to 60 ms, encoder offsets 0.02 to 0.06, and payloads 0.3 to 1 times the last link. No
+case is left out because its effect is invisible: an encoder offset on a vertical slide, or a torque gain on a joint
+with nothing but inertia, can't be seen by any method.
 
 ## One or two laws, a clean log
 """
-OPENING_ABRUPT = """## One or two laws, motions that start and stop at once
+OPENING_ABRUPT = """## One or two laws, motions that start and stop abruptly
 
-The same, along moves from pose to pose at constant speed, which is reached at a constant acceleration in 0.1 to 0.3 s:
-torque steps, and a log of 500 Hz does not tell when between two samples.
+These are the same cases along moves from pose to pose at constant speed. The joint reaches that speed with constant
+acceleration in 0.1 to 0.3 s. The torque then has steps, and a log at 500 Hz does not show when between two samples a
+step occurs.
 """
-OPENING_ROUGH = """## Friction on every joint, a rough log, and one more law beneath
+OPENING_ROUGH = """## Friction on every joint, a rough log, and one more law
 
-The same arms with MuJoCo's `frictionloss` (15 % of the joint's torque, give or take 40 %) and `damping` (10 %) on every
-joint; one more law of 6 to 25 % beneath, in five of six cases; three recordings of 20 s: sines, point to point, sines
-at a third of the speed. Encoders of 17 bits (slides 5 um), 2 % of coloured torque noise with spikes, uneven
-samples, lost ones, gaps of 20 ms.
+These are the same arms with MuJoCo's `frictionloss` (15 % of the joint's torque, plus or minus 40 %) and `damping`
+(10 %) on every joint. In five of six cases there is one more law of 6 to 25 %. There are three recordings of 20 s:
+sines, point to point, and sines at a third of the speed. Encoders have 17 bits (slides 5 um). Torque has 2 % of
+coloured noise with spikes. Samples are unevenly spaced, some are lost, and there are gaps of 20 ms.
 """
-OPENING_PARTS = """## A part that the model has not, a clean log
+OPENING_PARTS = """## A part that the model lacks, a clean log
 
-What takes another plant than the nominal arm, from `hand_parts.py`; each part on each arm once. Elasticity: a second
-joint with a spring on which its load swings at 6 to 12 Hz. Backlash: a second joint with MuJoCo's own limits, apart by
-1 to 5 % of how far the joint's positions spread. Coupling: a tendon with damping and friction. Push: on the last body's
-centre of mass, for 0.5 to 2 s, at once there and at once gone. Contact: a springy wall. Presliding: LuGre's bristles
-with damping. Thermal drift: exponential. Friction by position: a bump of another form than the library's. Stribeck:
-MuJoCo's dry friction and more at low speed, of power 1 or 2. Rotors are far lighter than what they drive, so that a
-blow on a flank throws them.
+These effects need another plant than the nominal arm (`hand_parts.py`). Each part is used once on each arm.
+Elasticity: a second joint with a spring, on which the load oscillates at 6 to 12 Hz. Backlash: a second joint with
+MuJoCo's own limits, 1 to 5 % of the spread of the joint's positions apart. Coupling: a tendon with damping and
+friction. Push: a force on the centre of mass of the last body that starts and ends at once and lasts 0.5 to 2 s.
+Contact: an elastic wall. Presliding: a LuGre model with damping. Thermal drift: exponential. Position-dependent
+friction: a bump of another form than the library's. Stribeck: MuJoCo's dry friction and more at low speed, with power
+1 or 2. Rotors are much lighter than what they drive, so an impact at the end of the gap accelerates them strongly.
 """
-OPENING_ROUGH_PARTS = """## Friction on every joint, a rough log, and such a part beneath
+OPENING_ROUGH_PARTS = """## Friction on every joint, a rough log, and a part that the model lacks
 
-As above: MuJoCo's friction on every joint, three rough recordings of 20 s.
+As above, with MuJoCo's friction on every joint and three rough recordings of 20 s.
 """
 
 
@@ -72,7 +74,7 @@ def table(cases: list[dict], ordinary: tuple[str, ...] = (), *, by_law: bool = F
     parts = dict.fromkeys(map(what, cases)) if by_law else ARMS
     apart = ["ordinary friction", "named"] if ordinary else []
     first = ["hidden" if by_law else "arm", "cases", "exact, nothing added", "hidden", "named"]
-    last = ["findings not there", "median error", "90 % intervals that cover"]
+    last = ["false findings", "median error", "90 % intervals that contain the truth"]
     heads = [*first, "listed as not testable", *apart, *last]
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for name, part in [*((p, [c for c in cases if what(c) == p]) for p in parts), ("all", cases)]:
@@ -85,14 +87,14 @@ def table(cases: list[dict], ordinary: tuple[str, ...] = (), *, by_law: bool = F
         row += [sum(len(without(c["found"], c["truth"])) for c in part), *_errors(_values(part, ordinary))]
         lines.append(f"| {name} | {' | '.join(map(str, row))} |")
     error, cover = _errors(_values(cases))
-    figures = "No parameter to compare: nothing that was hidden is named."
+    figures = "There is no parameter to compare, because nothing that was hidden is named."
     if error:
-        figures = f"Median error of the parameters of what is named, all laws: {error}; {cover} of their 90 % "
-        figures += "intervals cover the truth."
+        figures = f"The median error of the named parameters over all laws is {error}. {cover} of their 90 % intervals "
+        figures += "contain the truth."
     nothing = [c for c in cases if all(e["effect"] in ordinary for e in c["truth"])]
     false = sum(len(without(c["found"], c["truth"])) for c in nothing)
-    more = "Nothing more was hidden" if ordinary else "Nothing was hidden"
-    clear = [f"{more} in {len(nothing)} of them; findings not there: {false}."] if nothing else []
+    more = "nothing more was hidden" if ordinary else "nothing was hidden"
+    clear = [f"In {len(nothing)} of these cases {more}; false findings there: {false}."] if nothing else []
     return [
         *lines,
         "",

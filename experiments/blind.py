@@ -110,10 +110,10 @@ def table(out: pathlib.Path) -> str:
     lines = [
         "# Concealed physics: what the diagnosis finds",
         "",
-        "Written by `experiments/blind.py --table` from `results/blind_*.jsonl`. MuJoCo drives the arm in closed",
-        "loop with 5 % wrong inertials, encoder noise of 2e-5 rad and torque noise of 1 %; three recordings of 20 s",
-        "(15 s for random robots); effects of 6 to 20 % of the joint's torque. Errors are on recordings that the fit",
-        "did not see, at the joints of the hidden effect.",
+        "Written by `experiments/blind.py --table` from `results/blind_*.jsonl`. MuJoCo simulates the robot in closed",
+        "loop. Its inertials are 5 % wrong, encoder noise is 2e-5 rad, and torque noise is 1 %. There are three",
+        "recordings of 20 s (15 s for random robots). Each hidden effect makes 6 to 20 % of the joint's torque.",
+        "Errors are those of the joints with the hidden effect, on recordings that the fit did not see.",
         "",
         "| cases | number | exact name and joints, nothing added | within the stated set | any finding "
         "| corrected error at most half of refit's | worst corrected / refit | median parameter error "

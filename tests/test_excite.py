@@ -183,7 +183,7 @@ def test_excite_writes_a_motion_that_is_the_same_for_the_same_seed(tmp_path, cap
     for path in paths:
         assert cli.main(["excite", str(tmp_path), "--out", str(path), "--duration", "9", "--rate", "100"]) == 0
     said = capsys.readouterr().out
-    assert "from rest to rest" in said and "this motion does" in said
+    assert "from rest to rest" in said and "This motion shows" in said
     table = pd.read_csv(paths[0])
     assert list(table) == ["t", *(f"{k}.joint{j}" for k in ("q", "qd", "qdd") for j in (1, 2))]
     np.testing.assert_allclose(np.diff(table["t"]), 0.01, rtol=1e-6)
@@ -236,13 +236,14 @@ def test_the_sentences_say_what_is_separated_and_what_is_not():
     seen = (9.0,) * len(open_.hidden)
     made = dataclasses.replace(proposal(), odds_now=(0.5,), odds=(40.0,), exact=(50.0,), seen=seen)
     said = " ".join(proposal_sentences(arm()[1], open_, made))
-    assert "On joint2, Coulomb friction or" in said and "odds of 40 at least" in said and "against 0.5 by" in said
+    assert "On joint2, Coulomb friction or" in said and "should reach 40 at least" in said and "alone give 0.5" in said
     failed = dataclasses.replace(made, odds=(1.0,))
     said = " ".join(proposal_sentences(arm()[1], open_, failed))
-    assert "no motion that was tried separates them" in said and "less than a real joint departs from" in said
+    assert "none of the motions tried separates them" in said and "less than a real joint differs from" in said
     alike = dataclasses.replace(failed, exact=(1.0,), tried=52, too_strong=7)
     said = " ".join(proposal_sentences(arm()[1], open_, alike))
-    assert "along all 45 pieces" in said and "7 more need more torque" in said and "can explain what the other" in said
+    assert "along all 45 segments" in said and "7 others need more torque" in said
+    assert "can explain what the other" in said
     nothing = dataclasses.replace(open_, pairs=(), hidden=())
     none = dataclasses.replace(made, odds_now=(), odds=(), exact=(), seen=())
-    assert "left nothing open" in " ".join(proposal_sentences(arm()[1], nothing, none))
+    assert "left no question open" in " ".join(proposal_sentences(arm()[1], nothing, none))

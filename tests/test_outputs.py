@@ -2,13 +2,16 @@
 
 # ruff: noqa: F811 (fixtures are used by the name under which they are imported)
 
+import errno
 import json
 import os
 import pathlib
 import resource
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 import pytest
@@ -229,7 +232,10 @@ def test_an_empty_file_may_be_written_to_and_a_link_stays_one(recording, tmp_pat
 
 
 @pytest.mark.parametrize("command", ["diagnose", "predict", "excite"])
-@pytest.mark.parametrize("where", ["dangling", "long", "very long", "null", "below a file", "loop", "/sys/x"])
+@pytest.mark.parametrize(
+    "where",
+    ["dangling", "dangling/below", "long", "very long", "null", "below a file", "loop", "loop/below", "/sys/x"],
+)
 def test_what_cannot_be_written_to_is_refused_before_the_work(command, where, recording, tmp_path, capsys, monkeypatch):
     (tmp_path / "dangling").symlink_to(tmp_path / "gone")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
@@ -248,6 +254,66 @@ def test_what_cannot_be_written_to_is_refused_before_the_work(command, where, re
 def test_a_name_of_250_letters_is_a_name(recording, tmp_path, stub):
     assert run("diagnose", recording, "--out", tmp_path / ("x" * 250)) == 0
     assert run("predict", tmp_path, recording, "--out", tmp_path / ("y" * 246 + ".csv")) == 0
+    with results_file(tmp_path / ("z" * 246 + ".csv"), OURS) as results:
+        results.write(lambda folder: (folder / results.name).write_text("0"))
+    assert (tmp_path / ("z" * 246 + ".csv")).read_text() == "0"
+
+
+def test_a_name_that_leaves_no_room_for_that_of_the_layout_is_refused_before_the_work(
+    recording, tmp_path, capsys, stub
+):
+    before = contents(tmp_path)
+    words = ["predict", tmp_path, recording, "--measured", "--out", tmp_path / ("y" * 246 + ".csv")]
+    assert "ile name too long" in refused(capsys, *words)
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("command", ["predict", "excite"])
+def test_the_current_folder_is_no_file(command, recording, tmp_path, monkeypatch, capsys, stub):
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    words = [tmp_path, recording] if command == "predict" else [tmp_path]
+    assert "name a file, for example result.csv" in refused(capsys, command, *words, "--out", ".")
+    assert not list((tmp_path / "empty").iterdir())
+
+
+def test_a_file_that_is_a_mount_point_is_refused_before_the_work(recording, tmp_path, capsys, stub, monkeypatch):
+    out = tmp_path / "p.csv"
+    assert run("predict", tmp_path, recording, "--out", out) == 0
+    before = contents(tmp_path)
+
+    def link(*_):
+        raise OSError(errno.EXDEV, "Invalid cross-device link")  # what Linux says of a file that is mounted
+
+    monkeypatch.setattr(os, "link", link)
+    capsys.readouterr()
+    assert "is a mount point" in refused(capsys, "predict", tmp_path, recording, "--out", out)
+    assert contents(tmp_path) == before
+
+
+def test_a_disk_without_links_is_a_place_for_results(recording, tmp_path, stub, monkeypatch):
+    def link(*_):
+        raise OSError(errno.EPERM, "Operation not permitted")  # FAT and exFAT
+
+    monkeypatch.setattr(os, "link", link)
+    for _ in range(2):
+        assert run("predict", tmp_path, recording, "--out", tmp_path / "p.csv") == 0
+
+
+@pytest.mark.parametrize("command", ["diagnose", "predict"])
+def test_a_disk_that_is_mounted_takes_results(command, recording, tmp_path, stub):
+    """Moving files from one disk to another is no renaming: results are made on the disk where they shall be."""
+    disk = next((d for d in ("/dev/shm", "/run/user") if os.path.ismount(d) and os.access(d, os.W_OK)), None)
+    if disk is None or os.stat(disk).st_dev == os.stat(tmp_path).st_dev:
+        pytest.skip("no second disk here")
+    out = pathlib.Path(tempfile.mkdtemp(dir=disk)) / "d"
+    try:
+        words = [recording] if command == "diagnose" else [tmp_path, recording]
+        for _ in range(2):
+            assert run(command, *words, "--out", out) == 0
+        assert [p.name for p in out.parent.iterdir()] == ["d"]
+    finally:
+        shutil.rmtree(out.parent)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
@@ -303,9 +369,6 @@ def test_a_result_that_cannot_take_its_place_is_left_beside_it(forever, tmp_path
 
 
 def test_a_folder_that_is_gone_after_the_work_costs_no_result(recording, tmp_path, capsys, stub, monkeypatch):
-    import shutil
-    import tempfile
-
     (tmp_path / "tmp").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
     quick = irb140_jax.mismatch.diagnose

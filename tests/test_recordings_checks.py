@@ -13,6 +13,7 @@ import pytest
 import irb140_jax as irb
 from irb140_jax.errors import RecordingError
 from irb140_jax.recordings import Recording, read_recording, write_recording
+from irb140_jax.robot import irb140, irb140_path
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +62,15 @@ def test_everything_in_degrees_is_recognised(robot, tmp_path, speeds, seed):
     degrees = changed(sound, **{name: np.degrees(getattr(sound, name)) for name in ("q", "qd")})
     degrees = degrees if speeds else changed(degrees, qd=None)
     assert "look like degrees" in refusal(degrees, robot, tmp_path).replace("looks", "look")
+
+
+def test_a_slow_motion_seen_by_a_coarse_encoder_is_not_taken_for_degrees(tmp_path):
+    robot, arm = irb140(), mujoco.MjModel.from_xml_path(str(irb140_path()))
+    slower, step = 8.0, np.radians(1.0)
+    t, q, qd, qdd = made.motion(6, size=3.0, duration=3.0, rate=2000.0)
+    tau = made.rigid_torque(arm, q, qd / slower, qdd / slower**2)
+    slow = Recording(t=slower * t, q=step * np.round(q / step), tau=tau, joint_names=robot.joint_names)
+    np.testing.assert_array_equal(read(slow, robot, tmp_path).q, slow.q)
 
 
 def test_a_small_motion_in_degrees_within_the_limits_is_recognised_by_its_torque(robot, tmp_path):

@@ -187,7 +187,7 @@ def test_the_command_shows_a_look_and_writes_a_map_that_diagnose_takes(sound, tm
     formats.write_plotjuggler(sound, tmp_path / "log.csv")
     assert main(["inspect", str(tmp_path / "log.csv"), "--write-columns", str(tmp_path / "map.toml")]) == 0
     out = capsys.readouterr().out
-    assert "250 a second" in out and "/joint_states/elbow/position" in out and "--columns" in out
+    assert "250 per second" in out and "/joint_states/elbow/position" in out and "--columns" in out
     again = read_recording(tmp_path / "log.csv", made.robot(), tmp_path / "map.toml")
     np.testing.assert_allclose(again.q, sound.q, rtol=1e-12)
 
@@ -196,4 +196,4 @@ def test_a_map_that_is_there_is_never_replaced(sound, tmp_path, capsys):
     formats.write_plotjuggler(sound, tmp_path / "log.csv")
     (tmp_path / "map.toml").write_text("# mine")
     assert main(["inspect", str(tmp_path / "log.csv"), "--write-columns", str(tmp_path / "map.toml")]) == 2
-    assert "is there already" in capsys.readouterr().err and (tmp_path / "map.toml").read_text() == "# mine"
+    assert "exists already" in capsys.readouterr().err and (tmp_path / "map.toml").read_text() == "# mine"

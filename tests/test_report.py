@@ -103,7 +103,7 @@ def test_the_first_table_has_every_finding_at_its_joints_and_what_is_not_judged(
     values = {name: [cell["value"] for cell in cells] for name, cells in rows.items()}
     assert values["stribeck friction"] == ["", "8.431 ± 0.071", "", "", "", ""]
     assert values["transmission coupling"][4:] == ["2.310 ± 0.040"] * 2
-    assert rows["stribeck friction"][1]["more"] == "N m · 97 %, 1 rival"
+    assert rows["stribeck friction"][1]["more"] == "N m · 97 %, 1 alternative"
     assert values["error left"][3] == "not judged"
     assert "joint4 not judged" in Page(html_report(judged, views)).visible
 
@@ -200,7 +200,7 @@ def test_a_diagnosis_without_findings_or_views_has_a_report_too(diagnosis, views
     clean = diagnosis | {"verdict": "no_mismatch", "findings": [], "unexplained": [], "not_testable": []}
     bare = {"joints": views["joints"], "recordings": ["a.csv"]}
     page = Page(html_report(clean, bare))
-    assert "No mismatch" in page.visible and "Nothing to mend." in page.visible
+    assert "No mismatch" in page.visible and "The model needs no change." in page.visible
     assert not page.wrong
 
 

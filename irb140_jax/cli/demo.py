@@ -27,13 +27,13 @@ irb140 demo                         into irb140-demo-0
 irb140 demo --seed 7 --out demo     another effect, joint and strength"""
 
     seed: int = 0
-    """Draws the effect, its joint and strength, the wrong inertials, the motions and the noise."""
+    """Seed for the effect, its joint and strength, the wrong inertials, the motions and the noise."""
 
     out: Annotated[pathlib.Path | None, arg(metavar="DIR")] = None
-    """Folder for recordings, diagnosis, report and truth; by default irb140-demo-SEED in the current one."""
+    """Folder for recordings, diagnosis, report and truth; by default irb140-demo-SEED in the current folder."""
 
     json: bool = False
-    """Print diagnosis.json, and what is meant for people to stderr."""
+    """Print diagnosis.json to stdout, and the text for people to stderr."""
 
     def run(self) -> None:
         if self.seed < 0:

@@ -37,15 +37,15 @@ class Diagnose:
     EXAMPLES: ClassVar = """\
 irb140 diagnose fast.csv slow.csv --out d                        the ABB IRB 140, in SI units
 irb140 diagnose log.parquet --robot arm.urdf --out d             your robot, as MJCF or URDF
-irb140 diagnose left.csv --robot two_arms.urdf --hold torso=0.2 --out d    one arm of two; the rest stood still
+irb140 diagnose left.csv --robot two_arms.urdf --hold torso=0.2 --out d    one arm of two, with all other joints held
 irb140 diagnose log.csv --robot arm.xml --columns map.toml --out d     other names and units
 irb140 diagnose log.csv --out d --json > diagnosis.json          for a program"""
 
     recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
-    """Recordings (CSV, Parquet, NPZ, MAT, ROS bag, MCAP, LeRobot), best of several motions."""
+    """Recordings (CSV, Parquet, NPZ, MAT, ROS bag, MCAP, LeRobot); several different motions are best."""
 
     out: Out
-    """Folder for diagnosis.json and report.html: new, empty, or a former diagnosis, which is replaced."""
+    """Folder for diagnosis.json and report.html: a new or empty one, or a former diagnosis, which is replaced."""
 
     robot: Annotated[pathlib.Path | None, arg(metavar="MODEL.xml")] = None
     """MJCF or URDF of the robot; by default the ABB IRB 140 that ships with the package."""
@@ -57,14 +57,14 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
     """TOML file that maps other column names and units."""
 
     hold: Hold = ()
-    """Joint that stood still and where [rad or m], any number of times; other joints without columns are
-    taken to be at the model's reference, mostly zero."""
+    """A joint that did not move, and its position [rad or m]; may be given several times. Other joints without
+    columns are assumed to be at the model's reference, mostly zero."""
 
     fix_base: bool = False
-    """The base, which floats in the model, stood still."""
+    """Hold the base, where it floats in the model."""
 
     json: bool = False
-    """Print diagnosis.json, and what is meant for people to stderr."""
+    """Print diagnosis.json to stdout, and the text for people to stderr."""
 
     def run(self) -> None:
         if not self.recordings:

@@ -22,27 +22,27 @@ STEPS = {
 
 @dataclasses.dataclass(frozen=True)
 class Excite:
-    """Write the motion that separates what is undecided."""
+    """Write the motion that best answers the open questions of a diagnosis."""
 
     EXAMPLES: ClassVar = """\
 irb140 excite d --out motion.csv                              40 s at 250 rows per second
 irb140 excite d --out motion.csv --duration 20 --rate 500     shorter, for a faster controller
-irb140 diagnose old.csv played.csv --out d2                   with what the robot did along it"""
+irb140 diagnose old.csv new.csv --out d2                      then, with the recording of that motion"""
 
     folder: Folder
     """Folder of a diagnosis."""
 
     out: OutFile
-    """CSV file with t, q.<joint>, qd.<joint>, qdd.<joint>: the motion to play, from rest to rest."""
+    """CSV file with t, q.<joint>, qd.<joint>, qdd.<joint>: the motion for the robot, from rest to rest."""
 
     duration: Annotated[float, arg(metavar="SECONDS")] = 40.0
-    """About how long the motion may last."""
+    """Approximate length of the motion."""
 
     rate: Annotated[float, arg(metavar="HZ")] = 250.0
     """Rows per second."""
 
     seed: int = 0
-    """Of the search; the same seed gives the same motion."""
+    """Seed of the search; the same seed gives the same motion."""
 
     def run(self) -> None:
         if self.seed < 0:

@@ -16,24 +16,24 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Inspect:
-    """Say what recordings hold, in which units; write a column map."""
+    """Show what recordings hold and in which units; write a column map."""
 
     EXAMPLES: ClassVar = """\
-irb140 inspect log.csv                                                what is in it, in which units
-irb140 inspect log.mcap --robot arm.urdf --write-columns map.toml     a map to check and to go on with
-irb140 inspect log.csv --robot arm.urdf --columns map.toml            the log as the map has it"""
+irb140 inspect log.csv                                                what it holds, and in which units
+irb140 inspect log.mcap --robot arm.urdf --write-columns map.toml     a draft of the map, to be checked
+irb140 inspect log.csv --robot arm.urdf --columns map.toml            the log, read with the map"""
 
     recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
     """Recordings: CSV, Parquet, NPZ, MAT, ROS bags, MCAP, LeRobot."""
 
     robot: Annotated[pathlib.Path | None, arg(metavar="MODEL.xml")] = None
-    """MJCF or URDF of the robot: names the joints, and tells the units of torques."""
+    """MJCF or URDF of the robot. It gives the joint names and helps to find the units of torques."""
 
     columns: Columns = None
-    """TOML file that maps other column names and units, to begin with and to be tried."""
+    """TOML file that maps other column names and units; it is tried on the recordings."""
 
     write_columns: Annotated[pathlib.Path | None, arg(metavar="FILE.toml")] = None
-    """Write the column map that was guessed from the first recording."""
+    """Write the column map guessed from the first recording."""
 
     def run(self) -> None:
         if not self.recordings:
@@ -45,7 +45,7 @@ irb140 inspect log.csv --robot arm.urdf --columns map.toml            the log as
 
         out = self.write_columns
         if out.is_dir() or out.exists() and out.stat().st_size:
-            raise InputError(f"--write-columns {out}: this is there already, and a map may hold what you know; name "
+            raise InputError(f"--write-columns {out}: this file exists already and may hold your own changes; name "
                              "another file, or move it away")
         inputs = [path for path in (*self.recordings, self.robot, self.columns) if path]
         with results_file(out, lambda path: False, inputs) as results:

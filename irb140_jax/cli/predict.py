@@ -22,18 +22,18 @@ Table = dict[str, "np.ndarray"]
 
 @dataclasses.dataclass(frozen=True)
 class Predict:
-    """Write the torque of diagnosed models along a recording."""
+    """Write the torque of the diagnosed models along a recording."""
 
     EXAMPLES: ClassVar = """\
-irb140 predict d new.csv --out torque.csv                 of another recording of the robot
-irb140 predict d motion.csv --out torque.csv              of a motion without torque, as excite writes it
-irb140 predict d new.csv --out torque.csv --measured      beside what was measured, for PlotJuggler"""
+irb140 predict d new.csv --out torque.csv                 for another recording of the robot
+irb140 predict d motion.csv --out torque.csv              for a motion without torque, as excite writes it
+irb140 predict d new.csv --out torque.csv --measured      with the measured torque, for PlotJuggler"""
 
     folder: Folder
     """Folder of a diagnosis."""
 
     recording: Annotated[Positional[pathlib.Path], arg(metavar="REC")]
-    """The recording whose motion is used; it needs no torque."""
+    """Recording whose motion is used; it needs no torque."""
 
     out: OutFile
     """CSV file with t, tau_nominal.<joint>, tau_refit.<joint>, tau_corrected.<joint>."""
@@ -42,8 +42,8 @@ irb140 predict d new.csv --out torque.csv --measured      beside what was measur
     """TOML file that maps other column names and units."""
 
     measured: bool = False
-    """Also write tau_measured.<joint> and what each model leaves of it, residual_<model>.<joint>, and beside the table
-    a layout with which PlotJuggler opens it."""
+    """Also write tau_measured.<joint> and the residual of each model, residual_<model>.<joint>, and a PlotJuggler
+    layout beside the table."""
 
     def run(self) -> None:
         from irb140_jax.report import is_our_layout, is_our_table, results_file

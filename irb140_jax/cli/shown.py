@@ -75,4 +75,4 @@ def _rough(seconds: float) -> str:
 def tell_kept(results: "Results") -> None:
     """Say which files of the user stood in the way, and what they are called now."""
     for old, new in results.kept:
-        print(f"{old} is not as this command wrote it: kept as {new.name}", file=sys.stderr)
+        print(f"{old} differs from what this command wrote; it is kept as {new.name}", file=sys.stderr)

@@ -30,8 +30,8 @@ def report(error: Exception, words: Sequence[str]) -> str:
         traceback.print_exception(error)  # there is no disk to write it to
         return f"an unexpected error ({what}); please send the lines above to the authors"
     return (
-        f"an unexpected error ({what}); nothing of yours was changed; please send {path} to the authors, and the files "
-        "named on the command line if you may"
+        f"an unexpected error ({what}); none of your files was changed; please send {path} to the authors, and the "
+        "input files if you may"
     )
 
 

@@ -1,4 +1,4 @@
-"""Actuator lag: the real torque follows the logged one with a delay of first order."""
+"""Actuator lag: the real torque follows the logged torque as a first-order low-pass does."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,22 +11,22 @@ class ActuatorLag(AbstractEffect):
     """T d(real)/dt + real = logged, so the log holds T d(tau)/dt beyond the model."""
 
     slug = "actuator_lag"
-    title = "a drive that lags behind its log"
+    title = "actuator lag"
     equation = "T d tau/dt"
     source = "Khalil and Dombre, Modeling, Identification and Control of Robots, 2002"
     parameters = (Parameter("time_constant", "s", low=0.0),)
     variants = ((0,),)
     confused_with = {
-        "time_delay": "a delay acts on all joints alike",
+        "time_delay": "fast motion of several joints: a delay is the same for all of them",
         "joint_elasticity": "a chirp through the first resonance",
-        "viscous_friction": "two excitation frequencies: the phase of a lag grows with frequency",
+        "viscous_friction": "the same move at two frequencies: the phase shift of a lag grows with frequency",
     }
     logged = 2
     needs = "fast changes of this joint's torque"
-    history = "lets through what was asked for a moment before"
+    history = "depends on the torque commanded before"
     steps = True
     not_in_mjcf = (
-        "it is left out: an actuator with dyntype filter has it, but then a torque is no longer that of one instant"
+        "it is left out: MuJoCo can filter an actuator (dyntype), but then the torque depends on the past"
     )
 
     def columns(self, motion, joints, shape):

@@ -1,4 +1,4 @@
-"""Asymmetric friction: another level of dry friction in each direction."""
+"""Asymmetric friction: dry friction with a different level in each direction."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,14 +20,14 @@ class AsymmetricFriction(AbstractEffect):
     variants = ((0, 1),)
     confused_with = {
         "torque_offset": "dwells: an offset stays at rest, friction does not",
-        "coulomb_friction": "the same stretch in both directions, with dwells in the same posture",
+        "coulomb_friction": "the same path in both directions, with pauses at the same posture",
     }
     needs = "motion in both directions"
     feigned = 0.02  # errors of other laws are the same in both directions
     friction = True
     dissipative = True
     mjcf = "joint frictionloss for the mean of both directions, a constant spring torque for half their difference"
-    not_in_mjcf = "at rest the difference of the two directions stays on, as a constant torque"
+    not_in_mjcf = "the difference between the two directions acts at rest too, as a constant torque"
 
     def columns(self, motion, joints, shape):
         s = of_site(motion.direction, joints)

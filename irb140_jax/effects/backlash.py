@@ -22,7 +22,7 @@ STEPS = 4  # of the simulation per sample
 
 
 class Backlash(AbstractEffect):
-    """q_link = q - u: the link flies through the gap until a springy flank stops it.
+    """q_link = q - u: the link moves freely through the gap until an elastic flank stops it.
 
     M d2u/dt2 + (d tau/dqd) du/dt + (d tau/dq) u = tau - flank(u), tau what the link would need on the motor's path and
     flank(u) zero within +-gap/2.  u is simulated along the motion for a gap, a flank and its damping on the grid; its
@@ -31,7 +31,7 @@ class Backlash(AbstractEffect):
     """
 
     slug = "backlash"
-    title = "play between motor and link"
+    title = "backlash between motor and link"
     equation = "-(d tau/dq_j u + d tau/dqd_j du/dt + M_j d2u/dt2), the link free within |u| <= gap/2"
     source = "Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38, 2002"
     parameters = (
@@ -43,19 +43,19 @@ class Backlash(AbstractEffect):
     own = (0,)
     settled = 0.6  # true ones are 0.64 and more; half a gap of a few encoder noises takes that noise from the torque
     confused_with = {
-        "presliding_hysteresis": "reversals under different preload",
-        "joint_elasticity": "load reversals of several sizes: a gap is crossed whole, a spring bends in proportion",
-        "coulomb_friction": "reversals of the load without a reversal of the motion",
+        "presliding_hysteresis": "reversals under several preloads",
+        "joint_elasticity": "load reversals of several sizes: a gap is crossed whole, a spring bends with the load",
+        "coulomb_friction": "motion in which the load changes sign and the speed does not",
         "time_delay": "slow reversals of the load",
         "actuator_lag": "slow reversals of the load",
     }
-    needs = "the load on this joint changing sign, slowly and quickly"
+    needs = "a load on this joint that changes sign, both slowly and quickly"
     feigned = 0.06  # so does a flank at every step of an imperfect friction law
     coarse = 3.0  # a flank gives way by some law of its own, and smoothing spreads the jolt that the motor takes
     leans_on_inertials = True
     transmission = True
-    history = "flies from flank to flank, which takes a state of the link beside that of the motor"
-    not_in_mjcf = "it is left out: play takes a second joint, and the model another size"
+    history = "depends on where the link is in the gap, which is a state of its own"
+    not_in_mjcf = "it is left out: backlash needs a second joint in the model"
     everywhere = True
     beside = ("torque_offset",)  # the middle of the gap need not be where the model has no load
     scanned = round(3.0 * np.log(CROSSINGS[1] / CROSSINGS[0]) / np.log(RATIO))

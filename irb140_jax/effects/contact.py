@@ -1,4 +1,4 @@
-"""Contact: the tool leans on something springy in its surroundings."""
+"""Contact: the tool presses on something elastic in its surroundings."""
 
 import itertools
 
@@ -35,13 +35,13 @@ class Contact(AbstractEffect):
     )
     variants = ((0,),)
     confused_with = {
-        "external_wrench": "the same path again: a wall is there again, a push is not",
-        "gravity_spring": "the same joint positions with the tool elsewhere",
-        "position_dependent_friction": "the same stretch in both directions: friction changes sign, a wall does not",
+        "external_wrench": "the same path again: a wall acts again, a push does not",
+        "gravity_spring": "the same positions of this joint with the tool in other places",
+        "position_dependent_friction": "the same path in both directions: friction changes sign, a wall does not",
     }
-    needs = "tool paths that touch what stands around, and others that don't"
+    needs = "tool paths that touch the surroundings, and others that do not"
     everywhere = True
-    not_in_mjcf = "it is left out: a wall is a geometry of its own, with a solver's softness for its stiffness"
+    not_in_mjcf = "it is left out: MuJoCo needs a geometry for a wall, whose stiffness comes from the solver"
     scouts = True
     scanned = NORMALS * len(SHARES)
 
@@ -118,8 +118,8 @@ class Contact(AbstractEffect):
     def where(self, names, values, units):
         normal = ", ".join(f"{values[f'normal_{k}']:.2f}" for k in "xyz")
         return (
-            f"{names}: where the tool is less than {values['position']:.3g} m along ({normal}) of the world; it is "
-            f"pushed back with {values['stiffness']:.3g} N/m"
+            f"{names}: where the tool is less than {values['position']:.3g} m along the direction ({normal}) of the "
+            f"world; a wall pushes it back with {values['stiffness']:.3g} N/m"
         )
 
 

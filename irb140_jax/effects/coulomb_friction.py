@@ -1,4 +1,4 @@
-"""Coulomb friction: a torque of constant size against the motion."""
+"""Coulomb friction: a torque of constant size that opposes the motion."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,9 +18,9 @@ class CoulombFriction(AbstractEffect):
     parameters = (Parameter("coulomb", "{tau}", low=0.0),)
     variants = ((0,),)
     confused_with = {
-        "stribeck_friction": "a ladder of constant speeds from very slow to fast, both ways",
-        "load_dependent_friction": "the same speeds at several gravity loads or payloads",
-        "asymmetric_friction": "the same stretch in both directions, with dwells in the same posture",
+        "stribeck_friction": "a series of constant speeds from very slow to fast, in both directions",
+        "load_dependent_friction": "the same speeds under several gravity loads or payloads",
+        "asymmetric_friction": "the same path in both directions, with pauses at the same posture",
         "viscous_friction": "the same move at two speeds",
     }
     needs = "motion that reverses direction"

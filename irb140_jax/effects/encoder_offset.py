@@ -1,4 +1,4 @@
-"""Encoder offset: a joint's zero is wrong."""
+"""Encoder offset: the zero of a joint is wrong."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,17 +13,20 @@ class EncoderOffset(AbstractEffect):
     """q_logged = q + offset: tau(q_logged - offset) - tau(q_logged), to first order, on every joint."""
 
     slug = "encoder_offset"
-    title = "a wrong zero of an encoder"
+    title = "a wrong encoder zero"
     equation = "-offset d tau/d q_j"
     source = "Hollerbach, Khalil, Gautier, Springer Handbook of Robotics, 2016, ch. 6"
     parameters = (Parameter("offset", "{q}"),)
     variants = ((0,),)
     confused_with = {
-        "torque_offset": "postures in which the slope of gravity changes sign",
-        "gravity_tilt": "a sweep of the first joint",
-        "gravity_spring": "the whole range of the joint: a spring is linear in position, gravity is not",
+        "torque_offset": "postures in which the derivative of the gravity torque by position changes sign",
+        "gravity_tilt": "a sweep of the first joint over its range",
+        "gravity_spring": "the whole range of the joint: a spring torque is linear in position, gravity torque is not",
     }
-    needs = "postures in which the slope of gravity over this joint changes sign; or its zero mark"
+    needs = (
+        "postures in which the derivative of the gravity torque by this joint's position changes sign, or a check of "
+        "the zero mark"
+    )
     coarse = 0.0
     leans_on_inertials = True
     everywhere = True
@@ -50,4 +53,4 @@ class EncoderOffset(AbstractEffect):
 
     def where(self, names, values, units):
         offset = f"{values['offset']:.3g} {units['offset']}"
-        return f"{names}: along the slope of gravity and inertia over this joint; its zero is off by {offset}"
+        return f"{names}: wherever the torque changes with this joint's position; its zero is off by {offset}"

@@ -1,4 +1,4 @@
-"""External wrench: somebody or something pushes the tool for a while."""
+"""External wrench: someone or something pushes the tool for a while."""
 
 import itertools
 
@@ -38,11 +38,11 @@ class ExternalWrench(AbstractEffect):
     )
     variants = ((0, 1, 2),)
     confused_with = {
-        "contact": "the same path again: a wall is there again, a push is not",
+        "contact": "the same path again: a wall acts again, a push does not",
         "payload": "the same path again, without the push",
         "torque_offset": "the same path again, without the push",
     }
-    needs = "nothing: a push leaves its trace whenever it comes"
+    needs = "no special motion: any push during a recording is visible"
     once = True
     own = (0, 1, 2)
     not_in_mjcf = "it is left out: it happened once and is no part of the machine"

@@ -1,4 +1,4 @@
-"""Gravity spring: a counterbalance, cable or dress pack that pulls the joint towards a rest position."""
+"""Gravity spring: a counterbalance, a cable or a dress pack that pulls the joint towards a rest position."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,7 +20,7 @@ class GravitySpring(AbstractEffect):
     variants = ((0, 1),)
     confused_with = {
         "torque_offset": "the whole range of the joint",
-        "encoder_offset": "the whole range of the joint: a spring is linear in position, gravity is not",
+        "encoder_offset": "the whole range of the joint: a spring torque is linear in position, gravity torque is not",
     }
     needs = "the whole range of the joint, in several postures of the others"
     mjcf = "joint stiffness and springref"
@@ -45,6 +45,6 @@ class GravitySpring(AbstractEffect):
 
     def where(self, names, values, units):
         return (
-            f"{names}: {values['stiffness']:.3g} {units['stiffness']} away from {values['rest']:.3g} {units['rest']}, "
-            "at any speed"
+            f"{names}: {values['stiffness']:.3g} {units['stiffness']} times the distance from "
+            f"{values['rest']:.3g} {units['rest']}, at any speed"
         )

@@ -11,7 +11,7 @@ LARGEST = 0.5  # [rad]; beyond it first order is wrong, and a person sees it
 
 
 class GravityTilt(AbstractEffect):
-    """Torque of a gravity vector that leans: tau_g(g + g tilt e), e across gravity, in two components."""
+    """Torque of a tilted gravity vector: tau_g(g + g tilt e), e perpendicular to gravity, in two components."""
 
     slug = "gravity_tilt"
     title = "a base that is not level"
@@ -21,9 +21,9 @@ class GravityTilt(AbstractEffect):
     variants = ((0, 1),)
     confused_with = {
         "payload": "the same poses with and without a known mass",
-        "encoder_offset": "a sweep of the first joint",
+        "encoder_offset": "a sweep of the first joint over its range",
     }
-    needs = "postures whose gravity torques don't all scale together, with the first joint swept"
+    needs = "a sweep of the first joint, in postures whose gravity torques are not all in proportion"
     coarse = 0.0
     leans_on_inertials = True
     everywhere = True
@@ -56,7 +56,7 @@ class GravityTilt(AbstractEffect):
         return eqx.tree_at(lambda r: r.gravity, robot, jnp.asarray(leant))
 
     def where(self, names, values, units):
-        return f"{names}: in the torque of gravity, at rest too; the base leans by {np.degrees(values['tilt']):.3g} deg"
+        return f"{names}: in the gravity torque, at rest too; the base tilts by {np.degrees(values['tilt']):.3g} deg"
 
 
 def across(gravity: Float[Array, "3"]) -> Float[Array, "2 3"]:

@@ -1,4 +1,4 @@
-"""Joint elasticity: a spring between motor and link; positions are the motor's."""
+"""Joint elasticity: a spring between motor and link; the logged positions are those of the motor."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,7 +14,7 @@ NUMERICAL_DAMPING = 0.05  # Newmark's gamma beyond 1/2: takes out modes that the
 
 
 class JointElasticity(AbstractEffect):
-    """q_link = q - u, with u the bend of the spring: M d2u/dt2 + (d tau/dqd + D) du/dt + (d tau/dq + K) u = tau.
+    """q_link = q - u, with u the deflection of the spring: M d2u/dt2 + (d tau/dqd + D) du/dt + (d tau/dq + K) u = tau.
 
     The link swings on its spring, so u is simulated along the motion by Newmark's rule for a compliance 1/K on the
     grid; the amplitude is one where the grid has the right one.
@@ -29,15 +29,15 @@ class JointElasticity(AbstractEffect):
     confused_with = {
         "rotor_inertia": "a chirp through the first resonance",
         "actuator_lag": "a chirp through the first resonance",
-        "encoder_offset": "postures with gravity of either sign",
+        "encoder_offset": "postures with gravity torques of both signs",
     }
-    needs = "fast motion near the first resonance, or large gravity of either sign"
+    needs = "fast motion near the first resonance, or large gravity torques of both signs"
     leans_on_inertials = True
     feigned = 0.06  # a spring rings at every step of an imperfect friction law
     transmission = True
     everywhere = True
-    history = "bends with the rate of its load, which takes a state of the link beside that of the motor"
-    not_in_mjcf = "it is left out: a flexible joint takes a second joint, and the model another size"
+    history = "depends on the motion of the link, which is a state of its own"
+    not_in_mjcf = "it is left out: a flexible joint needs a second joint in the model"
 
     def shapes(self, scales, joints):
         soft, stiff = (1.0 / (float(scales.inertia[joints[0]]) * (2.0 * np.pi * f) ** 2) for f in MODES)
@@ -70,7 +70,7 @@ class JointElasticity(AbstractEffect):
 
     def where(self, names, values, units):
         stiffness = f"{values['stiffness']:.3g} {units['stiffness']}"
-        return f"{names}: where its torque changes quickly and where gravity bends it; {stiffness}"
+        return f"{names}: where the torque changes quickly and where gravity deflects the joint; {stiffness}"
 
 
 def _swing(load, mass, damping, spring, dt):

@@ -1,4 +1,4 @@
-"""Load-dependent friction: a gear that rubs harder the more torque it transmits."""
+"""Load-dependent friction: friction of a gear that grows with the torque it transmits."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,15 +20,15 @@ class LoadDependentFriction(AbstractEffect):
     contains = ("coulomb_friction",)
     variants = ((0, 1), (1,))  # some gears rub next to nothing without load
     confused_with = {
-        "coulomb_friction": "the same speed at several gravity loads or payloads",
+        "coulomb_friction": "the same speed under several gravity loads or payloads",
         "position_dependent_friction": "the same positions with another payload",
-        "torque_gain": "the same loads while standing still",
+        "torque_gain": "the same loads at rest",
     }
     needs = "motion in both directions under clearly different loads"
     friction = True
     dissipative = True
     mjcf = "joint frictionloss, for its constant part"
-    not_in_mjcf = "the part that grows with the load is left out: frictionloss knows no load"
+    not_in_mjcf = "the part that grows with the load is left out: frictionloss does not depend on load"
 
     def columns(self, motion, joints, shape):
         load = jnp.abs(of_site(motion.load, joints))
@@ -48,6 +48,6 @@ class LoadDependentFriction(AbstractEffect):
 
     def where(self, names, values, units):
         return (
-            f"{names}: against the motion, {100 * values['load_coefficient']:.3g} % of the transmitted torque "
-            f"on top of {values['coulomb']:.3g} {units['coulomb']}"
+            f"{names}: against the motion, {values['coulomb']:.3g} {units['coulomb']} plus "
+            f"{100 * values['load_coefficient']:.3g} % of the transmitted torque"
         )

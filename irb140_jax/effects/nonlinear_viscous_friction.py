@@ -12,7 +12,7 @@ class NonlinearViscousFriction(AbstractEffect):
     """tau = k |qd|^a sign(qd)."""
 
     slug = "nonlinear_viscous_friction"
-    title = "viscous friction that bends with speed"
+    title = "nonlinear viscous friction"
     equation = "k |qd|^a sign(qd)"
     source = "Waiboer, Aarts, Jonker, Multibody System Dynamics 14, 2005; Bittencourt et al., IROS 2010"
     parameters = (Parameter("coefficient", "{tau} (s/{q})^a", low=0.0), Parameter("exponent", "1", low=0.4, high=3.0))
@@ -21,14 +21,14 @@ class NonlinearViscousFriction(AbstractEffect):
     variants = ((0,),)
     confused_with = {
         "thermal_friction_drift": "the same move cold and warm",
-        "stribeck_friction": "constant speeds in the upper half of the speed range",
-        "viscous_friction": "constant speeds over the whole range",
+        "stribeck_friction": "several constant speeds in the upper half of the speed range",
+        "viscous_friction": "constant speeds over the whole speed range",
     }
     needs = "constant speeds over the whole speed range"
     feigned = 0.05  # every lubricant bends a little: Coulomb and viscous friction fit real joints to some percent
     friction = True
     dissipative = True
-    not_in_mjcf = "it is left out: joint damping is in proportion to speed"
+    not_in_mjcf = "it is left out: joint damping is proportional to speed"
 
     def shapes(self, scales, joints):
         return np.array([0.4, 0.5, 0.65, 0.8, 1.3, 1.6, 1.9, 2.3, 3.0])[:, None]
@@ -57,4 +57,4 @@ class NonlinearViscousFriction(AbstractEffect):
 
     def where(self, names, values, units):
         how = "less" if values["exponent"] < 1 else "more"
-        return f"{names}: at all speeds, growing {how} than in proportion, with speed to the {values['exponent']:.2g}"
+        return f"{names}: at all speeds; it grows {how} than linearly, as speed to the power {values['exponent']:.2g}"

@@ -1,4 +1,4 @@
-"""Payload: a mass on the last link that the model doesn't know."""
+"""Payload: a mass on the last link that is not in the model."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -21,9 +21,9 @@ class Payload(AbstractEffect):
     variants = (tuple(range(10)),)
     confused_with = {
         "gravity_tilt": "the same poses with and without a known mass",
-        "torque_gain": "a known payload, on and off",
+        "torque_gain": "the same motion with and without a known payload",
     }
-    needs = "gravity and acceleration of the last link in several orientations"
+    needs = "motion of the last link in several orientations, slow and fast"
     coarse = 0.0
     mjcf = "the last link's inertial"
     everywhere = True
@@ -56,4 +56,4 @@ class Payload(AbstractEffect):
         return with_phi(robot, robot.phi.at[-1].add(about_origin(robot.tool_position) @ jnp.asarray(w * SIZES)))
 
     def where(self, names, values, units):
-        return f"{names}: in the weight and inertia of the last link, {values['mass']:.3g} kg more than the model knows"
+        return f"{names}: in the weight and inertia of the last link, {values['mass']:.3g} kg more than in the model"

@@ -1,4 +1,4 @@
-"""Position-dependent friction: a stretch of the joint's range that rubs more."""
+"""Position-dependent friction: friction that is higher in a part of the joint's range."""
 
 import itertools
 
@@ -18,7 +18,7 @@ class PositionDependentFriction(AbstractEffect):
     """tau = Fc (1 + depth exp(-((q - centre)/width)^2)) sign(qd)."""
 
     slug = "position_dependent_friction"
-    title = "friction that varies along the joint's range"
+    title = "friction that depends on position"
     equation = "Fc (1 + depth exp(-((q - centre)/width)^2)) sign(qd)"
     source = "Armstrong, Friction: experimental determination, modeling and compensation, ICRA 1988"
     parameters = (
@@ -31,14 +31,14 @@ class PositionDependentFriction(AbstractEffect):
     variants = ((0, 1),)
     confused_with = {
         "load_dependent_friction": "the same positions with another payload",
-        "torque_ripple": "the same stretch in both directions: friction changes sign, ripple does not",
+        "torque_ripple": "the same path in both directions: friction changes sign, ripple does not",
     }
     needs = "motion in both directions over the whole range of the joint"
     friction = True
     dissipative = True
     adds_up = True
     mjcf = "joint frictionloss, for its constant part"
-    not_in_mjcf = "the change along the range is left out: frictionloss knows no position"
+    not_in_mjcf = "the change along the range is left out: frictionloss does not depend on position"
 
     def shapes(self, scales, joints):
         low, high = float(scales.low[joints[0]]), float(scales.high[joints[0]])

@@ -18,7 +18,7 @@ class PreslidingHysteresis(AbstractEffect):
     """
 
     slug = "presliding_hysteresis"
-    title = "friction that is springy before it slips"
+    title = "presliding hysteresis"
     equation = "Fc z, dz/dt = (stiffness/Fc) qd (1 - z sign(qd))"
     source = "P. R. Dahl, A solid friction model, Aerospace Corp. TOR-0158, 1968"
     parameters = (Parameter("coulomb", "{tau}", low=0.0), Parameter("stiffness", "{tau}/{q}", low=0.0))
@@ -26,16 +26,16 @@ class PreslidingHysteresis(AbstractEffect):
     absorbs = False  # what slips at once beside what is springy first is neither alone
     variants = ((0,),)
     confused_with = {
-        "backlash": "reversals under different preload",
-        "stribeck_friction": "micro-motion: presliding is springy before slip",
-        "coulomb_friction": "micro-motion around a reversal",
+        "backlash": "reversals under several preloads",
+        "stribeck_friction": "very small motions: before it slips, presliding friction acts like a spring",
+        "coulomb_friction": "very small motions around a reversal",
     }
-    needs = "micro-motion: slow reversals in which the joint turns less than a degree"
+    needs = "very small motions: slow reversals in which the joint turns by less than a degree"
     friction = True
-    history = "remembers how far its bristles were bent since the last reversal"
+    history = "depends on how far the joint has moved since its last reversal"
     steps = True
     mjcf = "joint frictionloss, for the level once it slips"
-    not_in_mjcf = "the springy motion before it slips is left out: frictionloss has none"
+    not_in_mjcf = "the elastic part before it slips is left out: frictionloss has none"
 
     def shapes(self, scales, joints):
         span = max(float(scales.high[joints[0]] - scales.low[joints[0]]), 1e-9)

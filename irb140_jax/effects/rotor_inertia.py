@@ -1,4 +1,4 @@
-"""Rotor inertia: the motor's own inertia, seen through the gear squared."""
+"""Rotor inertia: the inertia of the motor, multiplied by the square of the gear ratio."""
 
 import numpy as np
 
@@ -18,9 +18,9 @@ class RotorInertia(AbstractEffect):
     variants = ((0,),)
     confused_with = {
         "joint_elasticity": "a chirp through the first resonance",
-        "actuator_lag": "a friction reversal at several accelerations: a lag shifts it in time",
+        "actuator_lag": "reversals at several accelerations: a lag shifts the step of friction in time",
     }
-    needs = "high acceleration of the joint, with the joints before it moving too"
+    needs = "high acceleration of the joint while the joints before it move too"
     coarse = 0.0
     transmission = True
     mjcf = "joint armature"

@@ -25,15 +25,15 @@ class StribeckFriction(AbstractEffect):
     contains = ("coulomb_friction",)
     variants = ((0, 1),)
     confused_with = {
-        "coulomb_friction": "a ladder of constant speeds from very slow to fast, both ways",
-        "nonlinear_viscous_friction": "constant speeds in the upper half of the speed range",
-        "presliding_hysteresis": "micro-motion: presliding is springy before slip",
+        "coulomb_friction": "a series of constant speeds from very slow to fast, in both directions",
+        "nonlinear_viscous_friction": "several constant speeds in the upper half of the speed range",
+        "presliding_hysteresis": "very small motions: before it slips, presliding friction acts like a spring",
     }
-    needs = "slow motion: constant speeds below and above the Stribeck speed"
+    needs = "slow motion at constant speeds, below and above the Stribeck speed"
     friction = True
     dissipative = True
     mjcf = "joint frictionloss, for its constant part"
-    not_in_mjcf = "the rise at low speed is left out: frictionloss knows no speed"
+    not_in_mjcf = "the rise at low speed is left out: frictionloss does not depend on speed"
 
     def shapes(self, scales, joints):
         speed, rest = float(scales.speed[joints[0]]), float(scales.rest_speed[joints[0]])

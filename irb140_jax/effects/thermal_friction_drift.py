@@ -8,7 +8,6 @@ from irb140_jax.effects.grids import geometric_grid
 from irb140_jax.effects.motion import of_site
 from irb140_jax.effects.native import with_joint
 
-
 FASTEST = 10.0  # s: no gear warms faster; what settles sooner is something else
 
 
@@ -16,7 +15,7 @@ class ThermalFrictionDrift(AbstractEffect):
     """tau = Fv (1 - drop (1 - exp(-t/T))) qd, t since the recording began, cold."""
 
     slug = "thermal_friction_drift"
-    title = "friction that drifts as the joint warms up"
+    title = "friction that changes as the joint warms up"
     equation = "Fv (1 - drop (1 - exp(-t/T))) qd"
     source = "Bittencourt et al., IROS 2010; Simoni et al., Robotics and CIM 31, 2015"
     parameters = (
@@ -30,11 +29,11 @@ class ThermalFrictionDrift(AbstractEffect):
         "nonlinear_viscous_friction": "the same move cold and warm",
         "viscous_friction": "the same move cold and warm",
     }
-    needs = "the same motion from cold until warm"
+    needs = "the same motion repeated from cold until warm"
     friction = True
     dissipative = True
     mjcf = "joint damping, as it is once warm"
-    not_in_mjcf = "the drift is left out: damping doesn't change with time"
+    not_in_mjcf = "the change is left out: damping does not depend on time"
 
     def shapes(self, scales, joints):
         duration = max(scales.duration, 1.0)

@@ -1,4 +1,4 @@
-"""Time delay: torque and position channels of the log are out of step."""
+"""Time delay: the torque and position channels of the log are shifted in time against each other."""
 
 import jax
 import jax.numpy as jnp
@@ -18,20 +18,20 @@ class TimeDelay(AbstractEffect):
     """
 
     slug = "time_delay"
-    title = "torque and position out of step"
+    title = "a time delay between torque and position"
     equation = "tau(t + delay) - tau(t) on every joint"
     source = "Ljung, System Identification, 1999, ch. 4"
     parameters = (Parameter("delay", "s"),)
     variants = ((0,),)
     confused_with = {
-        "actuator_lag": "a delay acts on all joints alike",
-        "viscous_friction": "two excitation frequencies: the phase of a delay grows with frequency",
+        "actuator_lag": "fast motion of several joints: a delay is the same for all of them",
+        "viscous_friction": "the same move at two frequencies: the phase shift of a delay grows with frequency",
     }
     logged = 3
     needs = "fast motion of several joints"
     everywhere = True
-    history = "is in the clocks of the log, which shows a torque beside an earlier position"
-    not_in_mjcf = "it is in the clocks of the log, not in the arm"
+    history = "is a shift between the clocks of the log, which pairs each torque with an earlier position"
+    not_in_mjcf = "it belongs to the clocks of the log, not to the arm"
 
     def sites(self, robot):
         return np.arange(robot.n)[None, :]

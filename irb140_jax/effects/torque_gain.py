@@ -1,4 +1,4 @@
-"""Torque gain: the drive's torque constant is not what the log assumes."""
+"""Torque gain: the torque constant of the drive differs from the one that the log assumes."""
 
 import numpy as np
 
@@ -13,18 +13,18 @@ class TorqueGain(AbstractEffect):
     """real torque = gain x logged torque, so the log holds (1/gain - 1) x real torque beyond the model."""
 
     slug = "torque_gain"
-    title = "wrong torque constant"
+    title = "a wrong torque constant"
     equation = "(1/gain - 1) tau_model"
     source = "Gautier and Briot, Global identification of joint drive gains, JMR 6(2), 2014"
     parameters = (Parameter("gain", "1", low=1 / LARGEST, high=LARGEST),)
     variants = ((0,),)
     confused_with = {
-        "payload": "a known payload, on and off",
-        "rotor_inertia": "postures under gravity: a gain scales them, a rotor doesn't",
-        "load_dependent_friction": "the same loads while standing still",
+        "payload": "the same motion with and without a known payload",
+        "rotor_inertia": "postures with large gravity torque: a gain scales gravity torque, a rotor does not",
+        "load_dependent_friction": "the same loads at rest",
     }
     logged = 1
-    needs = "large gravity torque on this joint that other joints' torques confirm, or a known payload"
+    needs = "large gravity torque on this joint and on others with the same links, or a known payload"
     mjcf = "the gear of the actuator"
     not_in_mjcf = ""
 
@@ -51,5 +51,5 @@ class TorqueGain(AbstractEffect):
 
     def where(self, names, values, units):
         return (
-            f"{names}: in proportion to the joint's whole torque; the real torque is {values['gain']:.3g} x the logged"
+            f"{names}: in proportion to the whole torque; the real torque is {values['gain']:.3g} times the logged one"
         )

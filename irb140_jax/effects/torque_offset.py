@@ -18,14 +18,14 @@ class TorqueOffset(AbstractEffect):
     parameters = (Parameter("offset", "{tau}"),)
     variants = ((0,),)
     confused_with = {
-        "encoder_offset": "postures in which the slope of gravity changes sign",
+        "encoder_offset": "postures in which the derivative of the gravity torque by position changes sign",
         "gravity_spring": "the whole range of the joint",
         "asymmetric_friction": "dwells: an offset stays at rest, friction does not",
     }
     coarse = 0.0
     transmission = True
     needs = "postures with clearly different gravity torque"
-    mjcf = "joint stiffness and springref: a very soft spring, bent far"
+    mjcf = "joint stiffness and springref: a very soft spring with a large deflection"
     not_in_mjcf = ""
 
     def columns(self, motion, joints, shape):

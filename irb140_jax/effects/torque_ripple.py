@@ -1,4 +1,4 @@
-"""Torque ripple: cogging of the motor or the mesh of the gear, periodic in position."""
+"""Torque ripple: torque that is periodic in position, from motor cogging or gear mesh."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -21,13 +21,13 @@ class TorqueRipple(AbstractEffect):
     parameters = (Parameter("amplitude", "{tau}", low=0.0), Parameter("cycles_per_rad", "1/{q}", low=0.0))
     variants = ((0, 1),)
     confused_with = {
-        "position_dependent_friction": "the same stretch in both directions: friction changes sign, ripple does not"
+        "position_dependent_friction": "the same path in both directions: friction changes sign, ripple does not"
     }
     transmission = True
     needs = "slow motion through the whole range of the joint"
     scouts = True
     scanned = 100
-    not_in_mjcf = "it is left out: no joint torque of MJCF is periodic in position"
+    not_in_mjcf = "it is left out: MJCF has no joint torque that is periodic in position"
 
     def shapes(self, scales, joints):
         return np.geomspace(FEWEST_PERIODS, 30.0, POINTS)[:, None] / self._span(scales, joints)

@@ -1,4 +1,4 @@
-"""Transmission coupling: friction where the parts of two joints turn against each other, as in a wrist."""
+"""Transmission coupling: friction between parts of two joints that turn relative to each other, as in a wrist."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,12 +17,12 @@ class TransmissionCoupling(AbstractEffect):
     source = "Khalil and Dombre 2002, ch. 9 (Staubli wrist); Gautier, Dynamic identification of robots, ICRA 1997"
     parameters = (Parameter("viscous", "{tau} s/{q}", low=0.0), Parameter("coulomb", "{tau}", low=0.0))
     variants = ((0,), (0, 1))
-    confused_with = {"viscous_friction": "move each of the two joints with the other at rest"}
-    needs = "the two joints moving at speeds that are not in proportion"
+    confused_with = {"viscous_friction": "motion of each of the two joints while the other one rests"}
+    needs = "motion of both joints at speeds that are not in proportion"
     friction = True
     dissipative = True
     not_in_mjcf = (
-        "it is left out: a fixed tendon over both joints has it (damping, frictionloss), but a serial chain holds none"
+        "it is left out: it would need a fixed tendon over both joints (damping, frictionloss)"
     )
 
     def sites(self, robot):
@@ -54,4 +54,4 @@ class TransmissionCoupling(AbstractEffect):
 
     def where(self, names, values, units):
         viscous = f"{values['viscous']:.3g} {units['viscous']}"
-        return f"{names}: on both joints alike, in proportion to their relative speed, {viscous}"
+        return f"{names}: on both joints, in proportion to their relative speed, {viscous}"

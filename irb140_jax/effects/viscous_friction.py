@@ -1,4 +1,4 @@
-"""Viscous friction: a torque against the motion that grows with speed."""
+"""Viscous friction: a torque that opposes the motion and grows in proportion to speed."""
 
 import numpy as np
 
@@ -18,8 +18,8 @@ class ViscousFriction(AbstractEffect):
     variants = ((0,),)
     confused_with = {
         "coulomb_friction": "the same move at two speeds",
-        "time_delay": "two excitation frequencies: the phase of a delay grows with frequency",
-        "transmission_coupling": "move each of the two joints with the other at rest",
+        "time_delay": "the same move at two frequencies: the phase shift of a delay grows with frequency",
+        "transmission_coupling": "motion of each of the two joints while the other one rests",
     }
     needs = "motion at clearly different speeds"
     ordinary = True
@@ -45,4 +45,4 @@ class ViscousFriction(AbstractEffect):
 
     def where(self, names, values, units):
         viscous = f"{values['viscous']:.3g} {units['viscous']}"
-        return f"{names}: in proportion to speed, {viscous}, so mostly in the fast stretches"
+        return f"{names}: in proportion to speed, {viscous}, so mostly where the joint is fast"

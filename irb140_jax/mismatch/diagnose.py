@@ -12,7 +12,16 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
-from irb140_jax.mismatch.enough import sensor_scatter, torque_size, undecidable
+from irb140_jax.mismatch.enough import (
+    all_open,
+    coarse_positions,
+    comparable,
+    scatter_by_sensor,
+    too_little,
+    torque_size,
+    undecidable,
+    usable_rows,
+)
 from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, fitted
 from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding, torque_scale_odds
@@ -29,15 +38,14 @@ from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
 from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
 from irb140_jax.recordings.channels import with_lost_torque_marked
-from irb140_jax.recordings.check import MOVING
-from irb140_jax.recordings.condition import choose_band, conditioned
+from irb140_jax.recordings.check import MIN_SAMPLES, MOVING
+from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.repeats import with_motions_numbered, without_copies
+from irb140_jax.recordings.repeats import without_copies
 from irb140_jax.robot import Robot
 
 SCHEMA = 2  # of diagnosis.json
-FEWEST_ROWS = 80  # low-passed rows below which nothing can be said
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,7 +108,7 @@ def diagnose(
         The result; the same input gives the same result to 6 significant digits.
 
     Raises:
-        RecordingError: Too little is left of the recordings after conditioning.
+        RecordingError: A recording is too short for any filter, or holds what is no number.
     """
     # Thousands of small solves: a second BLAS thread costs more in waking up than it does.
     with threadpool_limits(1, "blas"):
@@ -114,15 +122,11 @@ def _diagnosed(
     recordings = [with_lost_torque_marked(_finite(r), moves, robot) for r in recordings]
     recordings, twice = without_copies(recordings)
     progress("smoothing and differentiating the positions")
-    band = choose_band(list(recordings), robot)
-    smooth, again = with_motions_numbered(conditioned(recordings, band), recordings)
-    rows = [len(band.kept(len(r.t))) for r in smooth]
-    if sum(rows) < FEWEST_ROWS or min(rows) < FEWEST_ROWS // 5:
-        raise RecordingError(
-            f"{smooth[int(np.argmin(rows))].source}: {min(rows)} samples below {band.torque:.3g} Hz are left after "
-            f"conditioning, {sum(rows)} in all; that is too few to compare, record at least 15 s of motion"
-        )
-    scatter = sensor_scatter(robot, recordings, smooth, band)
+    band, recordings, smooth, again = comparable(robot, recordings)
+    if reason := too_little(smooth, band):
+        return _nothing_compared(robot, recordings, smooth, band, config, reason, [*twice, *again])
+    parts = scatter_by_sensor(robot, recordings, smooth, band)
+    scatter = np.hypot(*parts)
     ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, scatter, progress)
     ex = dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= NAMED)
     progress("proving on data that the fit did not see")
@@ -138,23 +142,55 @@ def _diagnosed(
     gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)
     seen = visibility(ex, matters)
-    usable = np.sum([r.usable[band.kept(len(r.t))].sum(axis=0) for r in smooth], axis=0)
-    said = notes(robot, smooth, band, config.inertial_uncertainty, usable, proof.judged)
+    usual = notes(robot, smooth, band, config.inertial_uncertainty, usable_rows(smooth, band), proof.judged)
     origin = provenance(robot, recordings, config.options, config.words)
     missing = undecidable(robot, proof, logged, scatter, band)
-    said = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()] + twice + again + said + gap
+    open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
+    said = [*open_joints, *coarse_positions(robot, *parts, proof.judged), *twice, *again, *usual, *gap]
     every = [*found, *torque_scale_finding(robot, ex)]
     diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said), open_)
 
 
+def _nothing_compared(
+    robot: Robot, recordings: Sequence[Recording], smooth: Sequence[Conditioned], band: Band, config: DiagnoseConfig,
+    reason: str, repaired: list[str],
+) -> Result:  # fmt: skip
+    """The result where no joint could be compared: undecided, nothing refitted, and every effect open."""
+    uncertainty, n = config.inertial_uncertainty, robot.n
+    unjudged = notes(robot, smooth, band, uncertainty, usable_rows(smooth, band), np.zeros(n, dtype=bool))
+    said = [f"{reason}.", *repaired, *unjudged]
+    phi, rest_speed = np.asarray(robot.phi), np.max([r.rest_speed for r in smooth], axis=0)
+    model = CorrectedModel(robot, phi, phi, (), band, rest_speed, config.known_joints or robot.joint_names)
+    questions, seen = all_open(robot, config.effects, smooth, band, uncertainty)
+    columns = ("rmse_nominal", "rmse_refit", "rmse_corrected", "noise_floor")
+    many, joints = len(recordings), f"{n} joint{'s' if n != 1 else ''}"
+    diagnosis = rounded({
+        "schema": SCHEMA, "verdict": "undecided", "findings": [], "unexplained": [],
+        "not_testable": not_testable(robot, set(), seen),
+        "fit": {name: dict.fromkeys(columns) for name in robot.joint_names},
+        "notes": said,
+        "provenance": provenance(robot, recordings, config.options, config.words),
+        "summary": f"{many} recording{'s' if many != 1 else ''} of {joints} can't tell whether the model leaves "
+                   f"anything out. {reason}.",
+    })  # fmt: skip
+    views = {"joints": list(robot.joint_names), "recordings": [r.source for r in recordings], "notes": said}
+    empty = {"maps": {}, "motions": [], "ranking": [], "residual_spectrum": {}, "inertials": []}
+    return Result(diagnosis, model, views | empty, questions)
+
+
 def _finite(recording: Recording) -> Recording:
-    """The recording, if it is made of numbers.
+    """The recording, if it is made of numbers, and of as many as a file must hold.
 
     Raises:
         RecordingError: It isn't.
     """
+    if len(recording.t) < MIN_SAMPLES:
+        raise RecordingError(
+            f"{recording.source}: too short: {len(recording.t)} samples; allowed is {MIN_SAMPLES} samples at least: "
+            "record a longer motion"
+        )
     for name in ("t", "q", "tau"):
         bad = np.argwhere(~np.isfinite(getattr(recording, name)))
         if len(bad):

@@ -71,17 +71,17 @@ def _page(model: CorrectedModel) -> str:
     lines = [
         f"# {XML}: {model.robot.name}, corrected",
         "",
-        "Inertials as refitted together with the findings, moved by as little as it takes to be those of a possible",
-        "body. Shapes to draw or to touch are not in it; copy them from your own model. A motor's control is what the",
-        "controller asks for, so a torque constant found wrong is in its gear.",
+        "The inertial parameters are those refitted together with the findings, or the nearest physically possible",
+        "ones. The file has no visual or collision geometry; copy it from your own model. The control of a motor is",
+        "the torque that the controller commands, so a corrected torque constant is in the gear of that motor.",
     ]
     if not model.named:
-        lines += ["", "Nothing was named: only inertials differ from the model as given."]
-    for title, part in (("In it", whole), ("In it in part", partly), ("Not in it", without)):
+        lines += ["", "The diagnosis names no effect, so only inertial parameters differ from the model as given."]
+    for title, part in (("In the file", whole), ("In the file in part", partly), ("Not in the file", without)):
         if part:
             lines += ["", f"## {title}", "", *(_line(model, n) for n in part)]
     if partly or without:
-        lines += ["", "For what is not in it, use `irb140_jax.load_corrected` on this folder, or `irb140 predict`."]
+        lines += ["", "For what the file lacks, use `irb140_jax.load_corrected` on this folder, or `irb140 predict`."]
     return "\n".join(lines) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""Everything a person should know beside the verdict: repairs, assumptions, warnings, joints that were not judged."""
+"""What a person should know beside the verdict: repairs, assumptions, warnings, joints that were not judged."""
 
 from collections.abc import Sequence
 
@@ -28,8 +28,10 @@ def notes(
     out += [f"{r.source}: {_sentence(note)}" for r in smooth for note in r.notes]
     for name, count, enough in zip(robot.joint_names, rows, judged, strict=True):
         if not enough:
-            out.append(f"{name} is not judged: {count} rows in which it moves can be used; record a motion of {name}.")
+            out.append(f"{name} is not judged: it moves in only {count} usable rows; record a motion of {name}.")
     out.append(f"The model's inertials are taken to be right to {100 * uncertainty:.3g} % (--inertial-uncertainty).")
+    if not judged.any():
+        return list(dict.fromkeys(out))
     out.append(
         f"Compared below {band.torque:.3g} Hz; positions were smoothed below {band.position:.3g} Hz and "
         "differentiated. Figures leave out rows in which the joint rests: dry friction is undetermined there."
@@ -49,10 +51,10 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
     if gap is None:
         return ["corrected.xml could not be compared with the corrected model: MuJoCo has other joints."]
     reason = f"it lacks {', '.join(left_out)} in whole or in part" if left_out else (
-        "the inertials found are those of no body, and the file holds the nearest that are")
+        "the fitted inertials are physically impossible, and the file holds the nearest possible ones")
     return [
-        f"corrected.xml gives a torque of {name} that is {g:.3g} {'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of "
-        f"its torque) off the corrected model: {reason}. Where that matters use `irb140 predict`."
+        f"On {name} the torque of corrected.xml differs from that of the corrected model by {g:.3g} "
+        f"{'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of its torque): {reason}. Use `irb140 predict` instead."
         for name, slide, g, t in zip(robot.joint_names, robot.is_slide, gap, torque, strict=True)
         if g > NOTABLE_GAP * t > 0.0
     ]

@@ -106,9 +106,11 @@ def _check_angles(recording: Recording, seen: Glance, robot: Robot, model: Torqu
     names, source = recording.joint_names, recording.source
     remedy = "convert q to radians on the joint side, or map it with --columns and [scale] \"q.*\" = \"deg\""
     far = np.max(np.abs(recording.q[:, hinges]))
-    given = np.median(_misfit(seen.tau, model.total)[hinges])
-    if given < 0.7:
-        return  # in radians the model already tells most of the torque
+    whole, held = (_misfit(seen.tau, part)[hinges] for part in (model.total, model.gravity))
+    given = np.median(whole)
+    # Accelerations of coarse positions are noise, which would pass for a wrong unit; gravity needs positions only.
+    if given < 0.7 or np.min(held) < 0.7:
+        return  # in radians the model already tells most of the torque, or gravity most of one joint's
     for j in np.flatnonzero(hinges & np.isfinite(robot.lower) & np.isfinite(robot.upper)):
         lower, upper = float(robot.lower[j]), float(robot.upper[j])
         largest = float(np.max(np.abs(recording.q[:, j])))

@@ -197,7 +197,8 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     frozen = _lost_torque(recording, grid, reach)
     notes = list(recording.notes)
     if spikes:
-        notes.append(f"{spikes} torque spikes were replaced by the median of their neighbours")
+        what = "torque spike was" if spikes == 1 else "torque spikes were"
+        notes.append(f"{spikes} {what} replaced by the median of the neighbouring samples")
     usable, began = ~resting & ~lost[:, None] & ~frozen, float(recording.t[0])
     moving = (recording.source, grid, q, qd, qdd, tau, usable)
     q_noise = np.sqrt(0.5 * raw_rate * white)

@@ -43,8 +43,8 @@ class Segment:
     def said(self, names: Sequence[str]) -> str:
         """A few words for a person."""
         words = {
-            "fourier": "Fourier motion", "point_to_point": "moves from point to point with dwells",
-            "slow": "slow motion", "ladder": "constant speeds from very slow to fast, both ways",
+            "fourier": "Fourier motion", "point_to_point": "moves from point to point with pauses",
+            "slow": "slow motion", "ladder": "constant speeds from very slow to fast in both directions",
             "micro": "small reversals in several postures",
         }  # fmt: skip
         who = "all joints" if self.joint is None else names[self.joint]

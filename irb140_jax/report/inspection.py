@@ -23,8 +23,8 @@ def print_inspection(look: Inspection, console: Console) -> None:
     sentences += [f"Repaired or noted: {note}" for note in look.notes]
     if look.unused:
         sentences.append(f"Not used: {', '.join(look.unused[:20])}{' ...' if len(look.unused) > 20 else ''}")
-    sentences.append(f"With this map it can't be read yet: {look.refusal}" if look.refusal else
-                     "With this map it can be read.")  # fmt: skip
+    sentences.append(f"With this map the file can't be read yet: {look.refusal}" if look.refusal else
+                     "With this map the file can be read.")  # fmt: skip
     for sentence in sentences:
         console.print(sentence, soft_wrap=True, markup=False)
     console.print()
@@ -43,7 +43,7 @@ def _time(look: Inspection) -> str:
     if not math.isfinite(look.rate):
         return ""
     column = f"; time is {look.time} ({look.time_unit})" if look.time else ""
-    return f", {look.rate:.4g} a second for {look.duration:.4g} s{column}"
+    return f", {look.rate:.4g} per second for {look.duration:.4g} s{column}"
 
 
 def _unit(channel: Channel) -> str:

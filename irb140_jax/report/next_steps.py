@@ -28,24 +28,24 @@ def next_steps(diagnosis: Mapping, folder: str) -> list[Step]:
     steps = list(_recording(diagnosis, folder))
     if diagnosis["findings"] or diagnosis["verdict"] == "parameters_only":
         steps.append(Step(
-            "Check the corrected model on a motion that it has not seen: its torque beside the other two, row by row.",
+            "Check the corrected model on a new motion: this writes the torque of all three models, row by row.",
             (f"irb140 predict {here} another.csv --out torque.csv",),
         ))  # fmt: skip
         steps.append(Step(
-            f"Use it: {folder}/corrected.xml holds what MuJoCo can express (corrected.md says what it can't); "
-            "all of it is there in JAX.",
+            f"Use the corrected model: {folder}/corrected.xml is for MuJoCo (corrected.md says what it lacks); the "
+            "model in JAX is complete.",
             ("import irb140_jax as irb", f'robot = irb.load_corrected("{folder}")'),
         ))  # fmt: skip
     elif diagnosis["verdict"] == "no_mismatch":
         steps.append(Step(
-            "Nothing to mend. To see whether this holds elsewhere, compare the model with a motion of another kind.",
+            "The model needs no change. To check this further, compare it with another kind of motion.",
             (f"irb140 predict {here} another.csv --out torque.csv",),
         ))  # fmt: skip
     if diagnosis["unexplained"]:
         joints = ", ".join(dict.fromkeys(joint for rest in diagnosis["unexplained"] for joint in rest["joints"]))
         steps.append(Step(
-            f"Look at {joints} under “Motion and torque” below: torque over position and over speed shows what kind of "
-            "thing it is that has no name."
+            f"Look at {joints} under “Motion and torque” below: torque over position and over speed may show the "
+            "cause of the unexplained part."
         ))  # fmt: skip
     return steps
 
@@ -57,15 +57,15 @@ def _recording(diagnosis: Mapping, folder: str) -> Iterator[Step]:
     if not (undecided or rivals or diagnosis["not_testable"]):
         return
     why = (
-        "Record more: this motion is designed for what these recordings could not decide."
+        "Record more: this motion is designed to show what these recordings could not."
         if undecided
-        else "Let the robot play the motion that best separates the rivals" + (
+        else "Let the robot perform the motion that best separates the alternatives" + (
             " and shows what could not be tested." if diagnosis["not_testable"] else ".")
         if rivals
-        else "Let the robot play a motion that shows what these recordings could not."
+        else "Let the robot perform a motion that shows what these recordings could not."
     )  # fmt: skip
     yield Step(why, (f"irb140 excite {shlex.quote(folder)} --out motion.csv",))
-    yield Step("Record it, and diagnose old and new recordings together.", (_again(diagnosis, folder),))
+    yield Step("Record this motion, and diagnose old and new recordings together.", (_again(diagnosis, folder),))
 
 
 def _again(diagnosis: Mapping, folder: str) -> str:

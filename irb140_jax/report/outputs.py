@@ -61,13 +61,14 @@ def results_file(
         raise InputError(f"--out {out}: this is a folder; name a file, for example {out / 'result.csv'}")
     files = {real: ours} | {real.with_name(real.stem + end): own for end, own in (beside or {}).items()}
     for path, own in files.items():
+        _real(path)  # a name beside may be too long where that of `out` is not
         _check_file(out if path == real else path, path, own, inputs)
     _check_not_in(out, real, inputs)
 
     def owned(_: pathlib.Path) -> dict[str, str]:
         return {path.name: checksum(path) for path, own in files.items() if path.exists() and _replaceable(path, own)}
 
-    with _room(out, real.parent, owned, name=real.name) as results:
+    with _room(out, real.parent, owned, names=[path.name for path in files]) as results:
         yield results
 
 
@@ -119,7 +120,7 @@ def _of_manifest(folder: pathlib.Path) -> dict[str, str]:
 @contextlib.contextmanager
 def _room(
     out: pathlib.Path, folder: pathlib.Path, owned: Callable[[pathlib.Path], dict[str, str]], command: str = "",
-    name: str = "",
+    names: Iterable[str] = (),
 ) -> Iterator[Results]:  # fmt: skip
     """The folder made, if it isn't there, and room in it; without a result nothing of that is left."""
     made: list[pathlib.Path] = []
@@ -128,7 +129,7 @@ def _room(
             if not path.exists():
                 path.mkdir()
                 made.append(path)
-        results = Results(folder, owned, command, name)
+        results = Results(folder, owned, command, names)
     except OSError as error:
         _remove(made)
         raise InputError(
@@ -149,9 +150,11 @@ def _room(
 def _real(path: pathlib.Path) -> pathlib.Path:
     """Where a path leads to, links followed."""
     try:
-        real = path.expanduser().resolve()
-        if path.is_symlink() and not real.exists():
-            raise InputError(f"{path}: this link leads to {real}, which is not there; name another place")
+        path = path.expanduser()
+        for link in (path, *path.parents):
+            if link.is_symlink() and not link.exists():
+                raise InputError(f"{link}: this link leads to {link.resolve()}, which is not there; name another place")
+        real = path.resolve()
         real.exists()
         return real
     except (OSError, RuntimeError, ValueError) as error:

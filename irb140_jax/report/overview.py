@@ -38,7 +38,7 @@ def _found(finding: Mapping) -> dict:
     first = next(iter(finding["parameters"].values()), None)
     value, unit = (text.with_std(first["value"], first["std"]), f"{first['unit']} · ") if first else ("yes", "")
     rivals = len(finding["alternatives"])
-    more = unit + text.percent(p) + (f", {rivals} rival{'s' if rivals > 1 else ''}" if rivals else "")
+    more = unit + text.percent(p) + (f", {rivals} alternative{'s' if rivals > 1 else ''}" if rivals else "")
     return {"value": value, "more": more, "kind": "sure" if p is not None and p >= SURE else "open"}
 
 

@@ -27,11 +27,11 @@ def proposal_sentences(robot: Robot, open_: Undecided, proposal: Proposal) -> li
         lines.append(_pair(robot, pair, proposal, k))
     lines += _hidden(robot, open_, proposal)
     if not open_.pairs and not open_.hidden:
-        lines.append("The diagnosis left nothing open: along this motion every effect would show.")
+        lines.append("The diagnosis left no question open. Every effect would be visible along this motion.")
     unlimited = [n for n, v in zip(robot.joint_names, np.asarray(robot.velocity_limit), strict=True) if np.isinf(v)]
     if unlimited:
         lines.append(
-            f"The model gives no speed limit for {_listed(unlimited)}: the motion stays below twice the speed recorded."
+            f"The model has no speed limit for {_listed(unlimited)}: the motion stays below twice the recorded speed."
         )
     return lines
 
@@ -42,24 +42,24 @@ def _pair(robot: Robot, pair: Pair, proposal: Proposal, k: int) -> str:
     either, now, odds = f"On {where}, {one.title} or {other.title}", proposal.odds_now[k], proposal.odds[k]
     if odds > SEPARATED:
         return (
-            f"{either}: log odds of {odds:.3g} at least are to be expected for the true one, against {now:.3g} by the "
-            "recordings alone."
+            f"{either}: with this motion the log odds of the true one should reach {odds:.3g} at least; the recordings "
+            f"alone give {now:.3g}."
         )
     motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
-    better = f"; what may is {motion}" if motion else ""
-    return f"{either}: no motion that was tried separates them: {_why(proposal, k)}{better}."
+    better = f"; this may separate them: {motion}" if motion else ""
+    return f"{either}: none of the motions tried separates them, because {_why(proposal, k)}{better}."
 
 
 def _why(proposal: Proposal, k: int) -> str:
     """Why a motion does not separate two explanations."""
     if proposal.exact[k] > SEPARATED:
         return (
-            f"their torques differ along it (log odds of {proposal.exact[k]:.3g}, if both laws held exactly), but by "
-            "less than a real joint departs from either law"
+            f"their torques differ along this motion (log odds of {proposal.exact[k]:.3g} if both laws were exact), "
+            "but by less than a real joint differs from either law"
         )
-    played = f"along all {proposal.tried - proposal.too_strong} pieces of motion, of every kind within the limits"
-    many = f" ({proposal.too_strong} more need more torque than the motors give)" if proposal.too_strong else ""
-    return f"{played}{many}, one can explain what the other predicts"
+    played = f"along all {proposal.tried - proposal.too_strong} segments of motion within the limits"
+    many = f" ({proposal.too_strong} others need more torque than the motors have)" if proposal.too_strong else ""
+    return f"{played}{many}, either one can explain what the other one predicts"
 
 
 def _hidden(robot: Robot, open_: Undecided, proposal: Proposal) -> Iterator[str]:
@@ -71,9 +71,9 @@ def _hidden(robot: Robot, open_: Undecided, proposal: Proposal) -> Iterator[str]
             [robot.joint_names[j] for j in column.joints])
         shown[z >= VISIBLE].setdefault(column.effect.title, []).append(joints)
     if shown[True]:
-        yield f"What the recordings could not have shown and this motion does: {_titles(shown[True])}."
+        yield f"This motion shows what the recordings could not have shown: {_titles(shown[True])}."
     if shown[False]:
-        yield f"Not even this motion shows: {_titles(shown[False])}."
+        yield f"This motion does not show either: {_titles(shown[False])}."
 
 
 def _titles(effects: dict[str, list[str]]) -> str:

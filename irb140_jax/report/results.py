@@ -1,13 +1,14 @@
 """Results are written whole or not at all, and cost nobody a file that is not a former result."""
 
 import contextlib
+import errno
 import os
 import pathlib
 import shutil
 import signal
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from irb140_jax.errors import InputError
 from irb140_jax.report.made import DIAGNOSIS, MANIFEST, checksum, write_manifest
@@ -20,6 +21,12 @@ KEPT = ".kept"  # ends the name of a user's file that stood in the way of a resu
 class Results:
     """Room on the disk for what a command is going to write, see `results_folder` and `results_file`.
 
+    Args:
+        folder: Where the files shall be.
+        owned: Files of a former run in a folder, by name, with their checksums.
+        command: What writes, for the manifest; without one there is none.
+        names: Of the files, where they are known before the work; the first is `name`.
+
     Attributes:
         folder: Where the files shall be.
         name: Of the file, where it is one, links followed; else empty.
@@ -29,8 +36,11 @@ class Results:
     """
 
     def __init__(
-        self, folder: pathlib.Path, owned: Callable[[pathlib.Path], dict[str, str]], command: str = "", name: str = ""
-    ):
+        self, folder: pathlib.Path, owned: Callable[[pathlib.Path], dict[str, str]], command: str = "",
+        names: Iterable[str] = (),
+    ):  # fmt: skip
+        names = list(names)
+        name = names[0] if names else ""
         self.folder, self.name, self._owned, self._command = folder, name, owned, command
         self._scratch = pathlib.Path(tempfile.mkdtemp(prefix=SCRATCH, dir=folder))
         self.desk = self._scratch / "desk"
@@ -39,6 +49,8 @@ class Results:
         self._stuck = False  # whether files of a former run could not be put back
         try:
             self.desk.mkdir()
+            for file in names:
+                _rehearse(folder / file, self.desk)
             self._reserve = _reserved(self._scratch)
         except BaseException:
             shutil.rmtree(self._scratch, ignore_errors=True)
@@ -125,6 +137,20 @@ class Results:
         if self._stuck:
             self.misplaced += f"; what was there before is in {self._scratch / 'former'}"
         return other / "result"
+
+
+def _rehearse(file: pathlib.Path, desk: pathlib.Path) -> None:
+    """Raise if no file can have this name, or if the file that has it can't be moved out of the way."""
+    trial = desk / file.name
+    trial.touch()
+    trial.unlink()
+    if file.is_file() and not file.is_symlink():
+        try:
+            os.link(file, trial)
+            trial.unlink()
+        except OSError as error:
+            if error.errno == errno.EXDEV:  # other errors come from file systems that have no links
+                raise InputError(f"{file.name} is a mount point, which no result can replace; name another") from None
 
 
 def _reserved(folder: pathlib.Path):
