@@ -1,18 +1,21 @@
 """The whole study: every table and figure, published beside ours, and a page that says what holds.
 
-    python experiments/reproduce_all.py                               # the study's arm; half an hour on one core
+    python experiments/reproduce_all.py                               # the study's arm: what is not there yet
+    python experiments/reproduce_all.py --again                       # all of it, from nothing
     python experiments/reproduce_all.py --robot arm.xml [--joints n]  # the same tables for any other arm
     python experiments/reproduce_all.py --robot arm.xml --quick       # without the searches by the closed loop
     python experiments/reproduce_all.py --smoke                       # all steps as small as can be, in a new folder
 
-A step whose result is there for the same choices is left out (--again runs it nevertheless); an interrupted step goes
-on after the last part it stored.  The page, docs/study.md for the study's arm, is written anew each time.
+A step whose result is there for the same choices is left out; an interrupted step goes on after the last part it
+stored, that of --again, too, if one goes on without --again.  The page, docs/study.md for the study's arm, is written
+anew each time.
 """
 
 import dataclasses
 import hashlib
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -39,7 +42,7 @@ class Config(StudyConfig):
     """Which arm, and where to write.
 
     Attributes:
-        again: Run every step, whether its result is there or not.
+        again: First forget what is there, parts of steps included; files of results stay until they are made anew.
         quick: Leave out the searches by the closed loop, which take most of the time; the page says so.
     """
 
@@ -104,15 +107,25 @@ def steps(config: Config, arm: StudyArm) -> list[Step]:
     return found
 
 
+def forget(folder: pathlib.Path) -> None:
+    """Take away what tells a step that it, or a part of it, is done."""
+    for name in (RECORD, "table3_swarms.jsonl"):
+        (folder / name).unlink(missing_ok=True)
+    for name in ("table4_runs", "tracking_runs", "mlp_kinematics"):
+        shutil.rmtree(folder / name, ignore_errors=True)
+
+
 def run(config: Config, arm: StudyArm) -> pathlib.Path:
     """Every step that is not done, then the page; returns its path."""
     record = config.folder(arm) / RECORD
+    if config.again:
+        forget(config.folder(arm))
     done = json.loads(record.read_text(encoding="utf-8")) if record.is_file() else {}
     parts = steps(config, arm)
     for number, step in enumerate(parts, start=1):
         print(f"[{number}/{len(parts)}] {step.title}", flush=True)
         there = done.get(step.title) == step.mark and all(path.is_file() for path in step.outputs)
-        if there and not config.again:
+        if there:
             print("      there already", flush=True)
             continue
         started = time.perf_counter()

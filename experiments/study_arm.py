@@ -11,19 +11,16 @@ from functools import cached_property
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax.sharding import Mesh
 from jaxtyping import Array, Float
 
 from irb140_jax import identify
 from irb140_jax.errors import InputError
-from irb140_jax.robot import Robot, first_joints, irb140, load_robot
+from irb140_jax.robot import Robot, irb140, load_robot, subset
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 RESULTS, DOCS = ROOT / "results", ROOT / "docs"
 JOINTS_OF_THE_STUDY = 3
-# Share of the link's largest value below which an entry is zero: round-off of the file reader's principal axes.
-ROUND_OFF = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,44 +77,24 @@ class StudyArm:
         return f"{re.sub(r'[^A-Za-z0-9]+', '_', self.whole.name).strip('_').lower()}_{len(self.links)}_joints"
 
     @cached_property
+    def unknowns(self) -> identify.Unknowns:
+        """What is sought of these links; what is zero is not."""
+        return identify.unknowns(self.whole, self.links)
+
+    @property
     def x(self) -> Float[Array, " d"]:
         """True parameters, see `identify.link_parameters`."""
-        return identify.link_parameters(self.whole, self.links)
+        return self.unknowns.reference
 
     @cached_property
     def mass(self) -> Float[Array, " k"]:
         """Masses of the links [kg]."""
         return self.whole.mass[jnp.array(self.links)]
 
-    @cached_property
-    def searched(self) -> np.ndarray:
-        """Which of x are unknowns, shape (d,): a box relative to zero, or a percentage of it, has no meaning."""
-        k = len(self.links)
-        com, inertia = np.abs(np.asarray(self.x[: 3 * k]).reshape(k, 3)), np.abs(np.asarray(self.x[3 * k :]))
-        by_link = (com, inertia.reshape(k, 6))
-        return np.concatenate([(v > ROUND_OFF * v.max(axis=1, keepdims=True)).ravel() for v in by_link])
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Of the entries of x: cx1 ... Izz3."""
-        links = [i + 1 for i in self.links]
-        elements = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
-        return tuple([f"c{a}{i}" for i in links for a in "xyz"] + [f"{e}{i}" for i in links for e in elements])
-
-    def full(self, unknowns: Float[Array, "*s u"]) -> Float[Array, "*s d"]:
-        """x with these unknowns; what is not sought as it is."""
-        place = jnp.asarray(np.flatnonzero(self.searched))
-        every = jnp.broadcast_to(self.x, (*unknowns.shape[:-1], self.x.shape[0]))
-        return every.at[..., place].set(unknowns)
-
-    def mape(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Equation 30 of estimates (s, d), over the unknowns."""
-        return identify.mape(x, np.asarray(self.x), self.searched)
-
     def reduced(self, x: Float[Array, " d"] | None = None) -> Robot:
-        """The first joints with these parameters, or the true ones; what lies beyond counts to the last link."""
+        """These joints with these parameters, or the true ones; what lies beyond counts to the last link."""
         robot = self.whole if x is None else identify.with_link_parameters(self.whole, self.links, x)
-        return first_joints(robot, len(self.links))
+        return subset(robot, self.links)
 
 
 @dataclasses.dataclass(frozen=True)

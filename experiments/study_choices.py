@@ -44,9 +44,16 @@ class Choice:
     def changes(self) -> str:
         """In words."""
         unit = "mm at the tool" if self.control else "% of the centres of mass"
-        span = lambda ends: f"{ends[0]:.2g}" if ends[0] == ends[1] else f"{ends[0]:.2g} to {ends[1]:.2g}"  # noqa: E731
-        told = [f"{model} {span(ends)}" for model, ends in self.spans.items()]
+        told = [f"{model} {between(*ends)}" for model, ends in self.spans.items()]
         return ", ".join(told) + f" {unit}" if told else "not run"
+
+
+def between(low: float, high: float, digits: int = 2) -> str:
+    """A span in words; one number where both ends are printed alike, and what has none says so."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return "not defined"
+    ends = f"{low:.{digits}g}", f"{high:.{digits}g}"
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 # Attribute of a reading: what is open, and which other attributes may go along with it.

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from study_readings import PARTICLES, PUBLISHED, Reading
 from study_statistics import ALPHA, said
-from table3_report import pairs_of_readings
+from table3_report import pairs_of_readings, shares_of_pairs
 from table4_report import ours, weakest
 
 HOLDS, READS, LEVEL = "holds", "holds in part", "no difference"
@@ -64,7 +64,7 @@ def swarm_claims(table: dict, told: pd.DataFrame, sets: dict, time: dict | None,
     own = table | {"tests": {row["name"]: row for row in table["tests"]}}
     figures = [_reached(own, told, "qpso"), _reached(own, told, "pso"), _literal(own), _fitness(own), _normalised(own)]
     found = [
-        *(figures if is_studys else []), _better(own, told), _clamp(told), _lower_fitness(own, told), _plateau(own, told), _spread(told), _outliers(own), _products(told, sets), _feasible(own, told),
+        *(figures if is_studys else []), _better(own, told), _clamp(told), _lower_fitness(own, told), _plateau(own, told), _spread(told), _outliers(own, told), _products(told, sets), _feasible(own, told),
         _needed(own),
     ]  # fmt: skip
     return [claim for claim in found if claim] + ([_time(time)] if time else [])
@@ -74,17 +74,15 @@ def _reached(table: dict, told: pd.DataFrame, family: str) -> Claim:
     """Whether the published errors are reached, and how exactly."""
     wanted, near = PUBLISHED[family], table["nearest"][family]
     own = told[told["algorithm"] == family]
-    averaged = ""
-    if near["averaged_com"] is not None:
-        averaged = f"; the averaged set of its seeds {near['averaged_com']:.2g} % and {near['averaged_inertia']:.2g} %"
+    averaged = f"; the averaged set of its seeds {near['averaged_com']:.2g} % and {near['averaged_inertia']:.2g} %"
     errors = own[["com", "inertia"]].to_numpy() / [wanted["com"], wanted["inertia"]]
     below = (errors <= 1.0).all(axis=1).mean()
     within = int((np.abs(np.log(np.maximum(errors, 1e-12))) < math.log(NEAR)).all(axis=1).sum())
     return Claim(
         f"{family.upper()}: MAPE {wanted['com']} % of the centres of mass, {wanted['inertia']} % of the inertias",
         f"nearest reading {near['com']:.3g} % and {near['inertia']:.3g} %: *{near['name']}*" + averaged,
-        f"at most both in {percent(below)} of {len(own)} readings, both to a factor of {NEAR:g} in {within}; all readings "
-        f"span {own['com'].min():.2g} to {own['com'].max():.2g} %",
+        f"both reached or bettered in {percent(below)} of {len(own)} readings, both met to a factor of {NEAR:g} in {within}; all readings "
+        f"span {own['com'].min():.2g} to {own['com'].max():.2g} % of the centres of mass",
         by_share(below), "the text leaves box, velocity limit and units open, and the error goes wherever these put it",
         share=below,
     )  # fmt: skip
@@ -106,16 +104,20 @@ def _literal(table: dict) -> Claim | None:
 
 def _better(table: dict, told: pd.DataFrame) -> Claim:
     """Whether QPSO beats PSO: in the nearest pair, over all pairs, and with either's open choices at their best."""
-    over = table["over_pairs"]["com"]
-    row = table["tests"]["fitness: QPSO lower than PSO"]
+    over, statement = table["over_pairs"]["com"], "QPSO finds better parameters than PSO"
+    if not over["pairs"]:
+        why = "an error relative to zero is not defined"
+        return Claim(statement, "all centres of mass of this arm are zero", "", OPEN, why)
+    row, own = table["tests"]["fitness: QPSO lower than PSO"], table["tests"]["com: QPSO lower than PSO"]
+    in_pair = {"first": "yes", "second": "no", "neither": "no difference"}[own["lower"]]
     least = told[told["box"] == 0].assign(error=lambda r: r["com"] + r["inertia"])
     problems = ["inertia_weight", "units", "width", "place", "penalty"]
     best = least.groupby([*problems, "algorithm"])["error"].min().unstack("algorithm")[["pso", "qpso"]].dropna()
     won = int((best["qpso"] < best["pso"]).sum())
     return Claim(
-        "QPSO finds better parameters than PSO",
+        statement,
         f"lower error of the centres of mass in {percent(over['lower'])} of {over['pairs']} pairs of readings; with each algorithm's "
-        f"own open choices at their best, in {won} of {len(best)} problems; in the nearest pair, yes",
+        f"own open choices at their best, in {won} of {len(best)} problems; in the nearest pair, {in_pair}",
         f"the nearest pair's final fitness: {said(row)}",
         by_share(over["lower"]), "the order depends on the velocity limits, which the text does not give and which are not the same quantity",
         share=over["lower"],
@@ -124,12 +126,7 @@ def _better(table: dict, told: pd.DataFrame) -> Claim:
 
 def _clamp(told: pd.DataFrame) -> Claim:
     """PSO's error over the velocity limit alone."""
-    rows = told.set_index("reading")["com"]
-    found = []
-    for limit in (math.inf, 0.5, 0.2, 0.1, 0.05, 0.02):
-        name = str(Reading("pso", velocity_limit=limit, place="anywhere"))
-        if name in rows:
-            found.append(("none" if math.isinf(limit) else f"{limit:g}", float(rows[name])))
+    found = _by_limit(told, "com")
     span = ", ".join(f"{limit}: {com:.2g} %" for limit, com in found) or "not run"
     errors = [com for _, com in found]
     moved = max(errors) / min(errors) if errors else 1.0
@@ -141,6 +138,16 @@ def _clamp(told: pd.DataFrame) -> Claim:
         f"the velocity limit alone moves PSO by a factor of {moved:.2g}, the published gap is a factor of "
         f"{PUBLISHED_GAP:.2g}",
     )
+
+
+def _by_limit(told: pd.DataFrame, column: str) -> list[tuple[str, float]]:
+    """PSO as stated, from no velocity limit to the tightest: limit and what is asked for."""
+    rows, found = told.set_index("reading")[column], []
+    for limit in (math.inf, 0.5, 0.2, 0.1, 0.05, 0.02):
+        name = str(Reading("pso", velocity_limit=limit, place="anywhere"))
+        if name in rows and math.isfinite(rows[name]):
+            found.append(("none" if math.isinf(limit) else f"{limit:g}", float(rows[name])))
+    return found
 
 
 def _fitness(table: dict) -> Claim:
@@ -177,47 +184,60 @@ def _normalised(table: dict) -> Claim:
 def _lower_fitness(table: dict, told: pd.DataFrame) -> Claim:
     """51 % lower."""
     pair, over = table["nearest_pair"], table["over_pairs"]["fitness"]
-    ratio = pair["qpso"]["fitness"] / pair["pso"]["fitness"]
+    ratio, stated = pair["qpso"]["fitness"] / pair["pso"]["fitness"], PUBLISHED["qpso"]["fitness"] / PUBLISHED["pso"]["fitness"]
+    about, _ = shares_of_pairs(told, lambda pso, qpso: np.abs(np.log(qpso["fitness"] / pso["fitness"] / stated)) < math.log(NEAR))
+    change = f"{100 * (1 - ratio):.0f} % lower" if ratio < 1.0 else f"{ratio:.2g} times as high"
     return Claim(
         "QPSO's mean final fitness is about 51 % lower than PSO's",
-        f"{100 * (1 - ratio):.0f} % lower in the nearest pair; lower at all in {percent(over['lower'])} of {over['pairs']} pairs of readings",
+        f"a ratio of {stated:.2g}, to a factor of {NEAR:g}, in {percent(about)} of {over['pairs']} pairs of readings, lower at all in "
+        f"{percent(over['lower'])}; in the nearest pair {change}",
         said(table["tests"]["fitness: QPSO lower than PSO"]),
-        by_share(over["lower"]), "51 % is the ratio of the stated means; the size follows from the two velocity limits", share=over["lower"],
+        by_share(about), "51 % is the ratio of the stated means; the size follows from the two velocity limits", share=about,
     )  # fmt: skip
 
 
 def _plateau(table: dict, told: pd.DataFrame) -> Claim:
     """Where the curves flatten."""
     pair, over = table["nearest_pair"], table["over_pairs"]["plateau"]
+    stated = PUBLISHED["pso"]["plateau"]
+    near = np.abs(np.log(np.maximum(told.loc[told["algorithm"] == "pso", "plateau"], 1.0) / stated)) < math.log(NEAR)
+    own = [iterations for _, iterations in _by_limit(told, "plateau")]
+    moved = f"the velocity limit alone moves PSO's own plateau between {min(own):.0f} and {max(own):.0f} iterations" if own else ""
     return Claim(
         "PSO plateaus after about 27 iterations, QPSO later",
         f"QPSO later in {percent(over['higher'])}, earlier in {percent(over['lower'])} of {over['pairs']} pairs of readings; medians of the "
-        f"nearest pair: PSO {pair['pso']['plateau']:.0f}, QPSO {pair['qpso']['plateau']:.0f} iterations to 99 % of the fall",
+        f"nearest pair: PSO {pair['pso']['plateau']:.0f}, QPSO {pair['qpso']['plateau']:.0f} iterations to 99 % of the fall; PSO's within a factor of {NEAR:g} of {stated} in {percent(float(near.mean()))} of its readings",
         f"the nearest pair: {said(table['tests']['plateau: PSO earlier than QPSO'])}",
-        by_share(over["higher"]), "a tighter velocity limit is slower and ends lower; so does PSO with that limit", share=over["higher"],
+        by_share(over["higher"]), moved or "the order depends on the velocity limits", share=over["higher"],
     )  # fmt: skip
 
 
 def _spread(told: pd.DataFrame) -> Claim:
     """Whether QPSO's final scores are closer together."""
     over = pairs_of_readings(told.assign(relative=told["fitness_sd"] / told["fitness"]), "relative")
+    narrower, count = shares_of_pairs(told, lambda pso, qpso: qpso["fitness_iqr"] < pso["fitness_iqr"])
+    both, _ = shares_of_pairs(
+        told, lambda pso, qpso: (qpso["fitness_iqr"] < pso["fitness_iqr"]) & (qpso["fitness_sd"] > pso["fitness_sd"])
+    )
     return Claim(
         "QPSO is the more stable one: narrower box plot, though its standard deviation is larger",
-        f"standard deviation over mean of the final fitness smaller than PSO's in {percent(over['lower'])} of {over['pairs']} pairs of readings",
+        f"narrower box in {percent(narrower)} of {count} pairs of readings, together with a larger standard deviation in {percent(both)}; "
+        f"standard deviation over mean smaller than PSO's in {percent(over['lower'])}",
         "counted, not tested",
-        by_share(over["lower"]), "the stated figures, 0.43 and 0.90 of the mean, have QPSO as the less stable one", share=over["lower"],
+        by_share(both), "the stated figures, 0.43 and 0.90 of the mean, have QPSO as the less stable one", share=both,
     )  # fmt: skip
 
 
-def _outliers(table: dict) -> Claim:
+def _outliers(table: dict, told: pd.DataFrame) -> Claim:
     """Points beyond the whiskers of Figure 9."""
+    usual = told.groupby("algorithm")["outliers"].median()
     over, pair = table["over_pairs"]["outliers"], table["nearest_pair"]
     return Claim(
         "QPSO has fewer outliers among its final scores",
         f"fewer in {percent(over['lower'])}, more in {percent(over['higher'])} of {over['pairs']} pairs of readings; in the nearest pair "
         f"{pair['qpso']['outliers']:.0f} against {pair['pso']['outliers']:.0f}",
         "beyond 1.5 interquartile ranges; counted, not tested",
-        by_share(over["lower"]), "thirty runs have one or two such points in most readings of either", share=over["lower"],
+        by_share(over["lower"]), f"such points are few in any case: median of the readings {usual['pso']:g} of PSO's runs, {usual['qpso']:g} of QPSO's", share=over["lower"],
     )  # fmt: skip
 
 
@@ -246,14 +266,17 @@ def _products(told: pd.DataFrame, sets: dict) -> Claim | None:
             "QPSO is more sensitive particularly in the off-diagonal terms", "this arm's products of inertia are all zero", "",
             OPEN, "an error relative to zero is not defined; none was sought",
         )  # fmt: skip
-    miss = lambda which: 100.0 * np.abs(np.array(sets["sets"]["QPSO"])[:, which] / reference[which] - 1.0).mean()  # noqa: E731
+    miss = lambda which: 100.0 * np.abs(np.array(sets["sets"]["QPSO"])[:, which] / reference[which] - 1.0).mean(axis=1)  # noqa: E731
+    products, moments = miss(off), miss(diagonal)
+    apart = products.mean() - moments.mean()
+    unsure = 2.0 * math.hypot(*(x.std(ddof=1) / math.sqrt(len(x)) for x in (products, moments)))
     si = told[(told["algorithm"] == "qpso") & (told["units"] == "si")]["inertia"]
     units = f"; in SI units, as printed, the median reading misses the inertias by {si.median():.2g} %" if len(si) else ""
     return Claim(
         "QPSO is more sensitive particularly in the off-diagonal terms",
-        f"QPSO's mean error of products {miss(off):.2g} %, of moments {miss(diagonal):.2g} %{units}",
-        "means over the seeds of the nearest pair; not tested",
-        FAILS if miss(off) >= miss(diagonal) else READS,
+        f"QPSO's mean error of products {products.mean():.2g} %, of moments {moments.mean():.2g} %{units}",
+        f"{len(products)} seeds of the nearest pair: {apart:.2g} ± {unsure:.1g} % apart (twice the standard error); not tested",
+        LEVEL if abs(apart) <= unsure else FAILS if apart > 0.0 else READS,
         "only a normalised objective weighs a small product like a moment; the text states none",
     )  # fmt: skip
 
@@ -263,10 +286,12 @@ def _feasible(table: dict, told: pd.DataFrame) -> Claim:
     own = told[told["algorithm"].isin(list(PUBLISHED))]
     whole = float((own["possible"] == 1.0).mean())
     pair = min(row["possible"] for row in table["nearest_pair"].values())
+    without = own[own["penalty"] == "none"]
+    none = f"; without any penalty in {int((without['possible'] == 1.0).sum())} of {len(without)}" if len(without) else ""
     return Claim(
         "the penalty on bounds guides the search to physically consistent solutions",
         f"all seeds end at possible bodies in {percent(whole)} of {len(own)} readings of PSO and QPSO; in the nearest pair "
-        f"{100 * pair:.0f} % of the sets are possible",
+        f"{100 * pair:.0f} % of the sets are possible{none}",
         "pseudo-inertia of every link positive definite",
         by_share(whole), "bounds on single numbers do not make an inertia tensor possible; near enough to the reference all are", share=whole,
     )  # fmt: skip
@@ -326,13 +351,13 @@ def _learnt(network: dict) -> Claim:
     told = [c for c in cases if c["case"].get("optimiser") == "plain"]
     ours_of = next(c for c in cases if c["case"]["hidden"] == "1 x 50" and not c["case"]["refined"] and c not in told)
     best = min(cases, key=lambda c: c["validation"])
-    reached = [c for c in cases if c["validation"] <= 0.61]
+    reached = [c for c in cases if c["training"] <= 0.48 and c["validation"] <= 0.61]
     plain = f"gradient descent as told: {told[0]['training']:.3g} and {told[0]['validation']:.3g} mm; " if told else ""
     return Claim(
         "the network learns the kinematics to 0.48 mm in training, 0.61 mm in validation",
         f"one hidden layer of 50, {plain}with Adam, clipped steps and a cosine rate, which are ours: {ours_of['training']:.2g} and "
         f"{ours_of['validation']:.2g} mm; best of all, *{best['name']}*: {best['training']:.2g} and {best['validation']:.2g} mm",
-        f"{len(reached)} of {len(cases)} readings of the forward task stay within 0.61 mm, on synthetic samples",
+        f"{len(reached)} of {len(cases)} readings of the forward task stay within 0.48 mm in training and 0.61 mm in validation, on synthetic samples",
         by_share(len(reached) / len(cases)),
         "it validates lengths that are known to a hundredth of that; nothing dynamic is in it", share=len(reached) / len(cases),
     )  # fmt: skip
@@ -378,15 +403,18 @@ def beyond_claims(torque: dict, tracking: dict | None, noisy: dict | None, embed
     seen, truth = tracking["seen"], tracking["truth"]
     rows = [r for r in tracking["rows"] if r["algorithm"]]
     tracked = [r for r in rows if r["objective"] == "tracking"]
+    middle = next(r for r in tracking["rows"] if not r["algorithm"])
+    worth = [test for test in tracking["tests"] if test["name"].endswith("tracking: com, QPSO lower than PSO")]
     cheaper = [r for r in rows if r["objective"] in truth and r["objective"] != "tracking"]
     below = [r for r in cheaper if r["measures"][r["objective"]] < truth[r["objective"]]]
     found += [
         Claim(
             "tracking performance can take the place of known answers (future research)",
             f"tracking alone leaves the centres of mass off by {min(r['com'] for r in tracked):.0f} %, the inertias by "
-            f"{min(r['inertia'] for r in tracked):.0f} %, and predicts unseen torque to "
-            f"{min(r['torque_rmse'] for r in tracked):.2g} N m",
-            f"the loop shows {seen['tracking']['rank']} combinations of {len(seen['names'])} unknowns",
+            f"{min(r['inertia'] for r in tracked):.0f} % (the box's middle: {middle['com']:.0f} and {middle['inertia']:.0f} %), and predicts "
+            f"unseen torque to {min(r['torque_rmse'] for r in tracked):.2g} N m (the box's middle: {middle['torque_rmse']:.2g})",
+            f"{tracked[0]['runs']} seeds; the loop shows {seen['tracking']['rank']} combinations of {len(seen['names'])} unknowns"
+            + "".join(f"; centres of mass, QPSO against PSO: {said(test)}" for test in worth[:1]),
             READS, "it identifies what drives the arm, not the parameters one by one",
         ),
     ]  # fmt: skip
@@ -436,8 +464,8 @@ def _embedded(embedded: dict) -> Claim:
     within = [row for row in rows if row["p999_us"] < 1000.0]
     return Claim(
         "the identified model runs in real time on embedded platforms (future research)",
-        "; ".join(f"{row['form']}, {row['joints']} joints: {row['median_us']:.2g} µs" for row in rows),
+        "; ".join(f"{row['form']}, {row['joints']} joints: {row['median_us']:.3g} µs" for row in rows),
         f"99.9th percentile of the slowest form {slowest['p999_us']:.3g} µs; a cycle of 1 kHz has 1000",
         by_share(len(within) / len(rows)) if rows else OPEN,
-        "on a desktop processor; the C code needs no library, but no microcontroller was at hand", share=len(within) / len(rows),
+        f"on {embedded['made']['machine']}; the C code needs no library, but no microcontroller was at hand", share=len(within) / len(rows),
     )  # fmt: skip

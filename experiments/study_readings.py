@@ -129,14 +129,9 @@ def rule(reading: Reading) -> swarm.Rule:
 
 def objective(reading: Reading, arm: StudyArm) -> identify.ParameterDistance:
     """Equation 20 over the arm's unknowns as the reading has it, box included."""
-    sought = jnp.asarray(arm.searched)
-    x = jnp.where(sought, arm.x, 1.0)  # what is not sought must not divide by zero; it is left out below
-    place = 0.5 if reading.place == "centre" else jnp.asarray(np.random.default_rng(reading.box).uniform(size=x.shape))
-    lower, upper = identify.box(x, reading.width, place=place)
-    aim = identify.parameter_distance(x, lower, upper, units=reading.units, penalty=PENALTY[reading.penalty])
-    return identify.ParameterDistance(
-        aim.reference[sought], aim.unit[sought], aim.lower[sought], aim.upper[sought], aim.penalty
-    )
+    d = arm.x.shape[0]
+    place = 0.5 if reading.place == "centre" else jnp.asarray(np.random.default_rng(reading.box).uniform(size=d))
+    return arm.unknowns.distance(reading.width, place=place, units=reading.units, penalty=PENALTY[reading.penalty])
 
 
 def all_readings() -> Iterator[Reading]:

@@ -24,6 +24,7 @@ FAMILIES = {
     "control": "Tables 4 and 5: every statement of the text in every reading of the control",
     "network": "what each penalty changes near singular poses",
     "future": "the swarms that the study leaves to the future, with torque noise",
+    "tracking": "QPSO against PSO when the closed loop is the objective",
 }
 
 
@@ -125,15 +126,19 @@ def _interval(values: np.ndarray) -> list[float]:
 def said(row: dict, unit: str = "") -> str:
     """A test in words."""
     low, high = row["effect_interval"]
-    text = f"p = {row['p_holm']:.1g} (Holm), effect {row['effect']:.2f} [{low:.2f}, {high:.2f}]"
+    # More digits where one could hide on which side of the limit it is.
+    digits = 3 if 0.5 < row["p_holm"] / ALPHA < 2.0 else 1
+    text = f"p = {row['p_holm']:.{digits}g} (Holm), effect {row['effect']:.2f} [{low:.2f}, {high:.2f}]"
+    # The interval is of this test alone, p of the whole family.
+    alone = "; alone it would count, among so many tests it does not" * bool(row["p"] < ALPHA <= row["p_holm"])
     if row["difference"] is None:
-        return text
+        return text + alone
     ends = row["difference_interval"]
     text += f", means differ by {row['difference']:.2g}{unit} [{ends[0]:.2g}, {ends[1]:.2g}]"
     sure = ends[0] * ends[1] > 0.0
     if sure and math.copysign(1.0, row["difference"]) * row["effect"] < 0.0:
         text += "; the means point the other way than most runs, because of a few runs with large values"
-    return text
+    return text + alone
 
 
 def rounded(values: np.ndarray, digits: int = DIGITS) -> np.ndarray:

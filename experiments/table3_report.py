@@ -14,9 +14,6 @@ from study_readings import PUBLISHED, Reading, literal_readings
 from study_statistics import Test, said, tested
 
 RUNS, READINGS = "table3_runs.parquet", "table3_readings.parquet"
-# Means of readings whose single runs were not kept when they were made.
-EARLIER = "table3_earlier.parquet"
-MEANS = ("com", "com_sd", "inertia", "inertia_sd", "fitness", "fitness_sd", "plateau", "possible")
 FIELDS = tuple(Reading.__dataclass_fields__)
 PROBLEM = ["inertia_weight", "units", "width", "place", "penalty", "box"]
 
@@ -33,16 +30,15 @@ def runs_of(rows: list[dict]) -> pd.DataFrame:
     return frame.astype({key: kind for key, kind in columns.items()})
 
 
-def readings_of(rows: list[dict], earlier: pd.DataFrame | None = None) -> pd.DataFrame:
-    """One row a reading: its choices, and what only all its seeds together have; means of those without runs."""
+def readings_of(rows: list[dict]) -> pd.DataFrame:
+    """One row a reading: its choices, what only all its seeds together have, and the commit that ran it."""
     told = [{k: v for k, v in row["reading"].items() if k != "inertia"} for row in rows]
     frame = pd.DataFrame(told).assign(
         inertia_weight=[row["reading"]["inertia"] for row in rows], reading=[row["name"] for row in rows],
         plateau_of_mean=[row["plateau_of_mean"] for row in rows],
         averaged_com=[row["averaged"][0] for row in rows], averaged_inertia=[row["averaged"][1] for row in rows],
+        commit=[row["commit"] for row in rows],
     )  # fmt: skip
-    if earlier is not None:
-        frame = frame.merge(earlier.drop(columns="plateau_of_mean").rename(columns={k: f"earlier_{k}" for k in MEANS}), how="left")
     literal = {str(reading) for reading in literal_readings()}
     return frame.assign(literal=frame["reading"].isin(literal))
 
@@ -52,11 +48,9 @@ def judged(runs: pd.DataFrame, readings: pd.DataFrame) -> pd.DataFrame:
     by = runs.astype({k: float for k in ("com", "inertia", "fitness")}).groupby("reading", sort=False)
     told = pd.DataFrame({key: by[key].mean() for key in ("com", "inertia", "fitness", "at_wall", "possible")})
     told = told.assign(**{f"{key}_sd": by[key].std() for key in ("com", "inertia", "fitness")})
-    told = told.assign(plateau=by["plateau"].median(), outliers=by["fitness"].apply(outliers))
-    told = readings.merge(told, left_on="reading", right_index=True, how="left", validate="one_to_one")
-    for key in MEANS if "earlier_com" in told else ():
-        told[key] = told[key].fillna(told[f"earlier_{key}"])
-    return told
+    told = told.assign(plateau=by["plateau"].median(), outliers=by["fitness"].apply(outliers),
+                       fitness_iqr=by["fitness"].quantile(0.75) - by["fitness"].quantile(0.25))  # fmt: skip
+    return readings.merge(told, left_on="reading", right_index=True, validate="one_to_one")
 
 
 def outliers(values: pd.Series) -> int:
@@ -68,7 +62,8 @@ def outliers(values: pd.Series) -> int:
 def distance(row: dict, family: str) -> float:
     """How far a row is from the published one: root mean square of the logarithms of ours over published."""
     published = PUBLISHED[family]
-    logs = [math.log(max(row[k], 1e-12) / published[k]) for k in ("com", "inertia")]
+    known = [k for k in ("com", "inertia") if math.isfinite(row[k])]  # of centres that are all zero there is no error
+    logs = [math.log(max(row[k], 1e-12) / published[k]) for k in known]
     if "plateau" in published:
         logs.append(math.log(max(row["plateau_of_mean"], 1) / published["plateau"]))
     return math.sqrt(float(np.mean(np.square(logs))))
@@ -123,6 +118,16 @@ def pairs_of_readings(told: pd.DataFrame, column: str) -> dict[str, float]:
     return {"lower": lower / max(count, 1), "higher": higher / max(count, 1), "pairs": count}
 
 
+def shares_of_pairs(told: pd.DataFrame, holds) -> tuple[float, int]:
+    """Share of all pairs of readings of one problem in which holds(PSO's rows, QPSO's rows) is true, and their number."""
+    yes = count = 0
+    for _, problem in told[told["box"] == 0].groupby(PROBLEM):
+        pso, qpso = ({c: problem.loc[problem["algorithm"] == f, c].to_numpy() for c in problem} for f in PUBLISHED)
+        found = holds({c: v[None] for c, v in pso.items()}, {c: v[:, None] for c, v in qpso.items()})
+        yes, count = yes + int(found.sum()), count + found.size
+    return yes / max(count, 1), count
+
+
 def tests_of(pair: dict[str, dict]) -> list[Test]:
     """QPSO against PSO in this pair; Table 5's first rows."""
     of = lambda f: (("reading", pair[f]["reading"]),)  # noqa: E731
@@ -134,12 +139,12 @@ def tests_of(pair: dict[str, dict]) -> list[Test]:
 def summary(told: pd.DataFrame, baselines: list[dict], folder: pathlib.Path) -> dict:
     """What is written: nearest readings, tests, baselines, and who reaches what."""
     of = lambda family: told[told["algorithm"] == family]  # noqa: E731
-    least = lambda some: some.loc[(some["com"] + some["inertia"]).idxmin()].to_dict()  # noqa: E731
+    least = lambda some: some.loc[some[["com", "inertia"]].sum(axis=1).idxmin()].to_dict()  # noqa: E731
     pair = pair_of(told)
     usual = ~told["algorithm"].isin(list(PUBLISHED)) & (told["units"] == "normalised") & (told["width"] == 0.5)
     boxes = told[told["box"] > 0]
     return {
-        "published": PUBLISHED, "count": len(told), "count_means_only": int(told["at_wall"].isna().sum()), "count_of": told["algorithm"].value_counts().to_dict(),
+        "published": PUBLISHED, "count": len(told), "count_of": told["algorithm"].value_counts().to_dict(),
         "literal": {f: _span(of(f)[of(f)["literal"]]) for f in PUBLISHED},
         "nearest": {f: short(r) | {"distance": distance(r, f)} for f, r in alone(told, distance).items()},
         "nearest_pair": {f: short(r) | {"distance": distance(r, f)} for f, r in pair.items()},
@@ -164,7 +169,7 @@ def short(row: dict) -> dict:
     """What is told of a reading."""
     keys = ("com", "com_sd", "inertia", "inertia_sd", "averaged_com", "averaged_inertia", "fitness", "fitness_sd",
             "plateau", "plateau_of_mean", "at_wall", "possible", "outliers")  # fmt: skip
-    # What is not known of a reading without single runs is left empty.
+    # An error that is not defined for an arm, of centres that are all zero, is left empty.
     told = {key: float(f"{row[key]:.5g}") if math.isfinite(row[key]) else None for key in keys}
     return {"name": row["reading"]} | told
 

@@ -17,6 +17,7 @@ import dataclasses
 import itertools
 import json
 import math
+import pathlib
 import time
 
 import jax
@@ -26,7 +27,7 @@ import pandas as pd
 import tyro
 from figures_swarms import draw
 from jax.sharding import Mesh
-from study_arm import ROUND_OFF, StudyArm, StudyConfig
+from study_arm import StudyArm, StudyConfig
 from study_provenance import made, store
 from study_readings import (
     ITERATIONS,
@@ -40,7 +41,7 @@ from study_readings import (
     rule,
     usual_readings,
 )
-from table3_report import EARLIER, READINGS, RUNS, page, pair_of, readings_of, runs_of, summary
+from table3_report import READINGS, RUNS, page, pair_of, readings_of, runs_of, summary
 from table3_report import judged as judged_readings
 
 from irb140_jax import identify, swarm
@@ -49,13 +50,7 @@ from irb140_jax.compilation_cache import set_up_compilation_cache
 
 @dataclasses.dataclass(frozen=True)
 class Config(StudyConfig):
-    """Which arm, and where to write.
-
-    Attributes:
-        earlier: Take readings of measured bits, two thirds of the time, as means where table3_earlier.parquet has them.
-    """
-
-    earlier: bool = True
+    """Which arm, and where to write."""
 
     @property
     def size(self) -> dict[str, int]:
@@ -86,9 +81,9 @@ consistent = jax.jit(jax.vmap(identify.consistency, (0, None)))
 def judged(reading: Reading, arm: StudyArm, size: dict[str, int], mesh: Mesh | None = None) -> dict:
     """One row: errors by equation 30, fitness, plateau, share of possible bodies."""
     found = jax.device_get(minima(reading, arm, size, mesh))
-    x = arm.full(found.x)
-    com, inertia = arm.mape(np.asarray(x))
-    averaged = arm.mape(np.asarray(x).mean(axis=0))
+    x = arm.unknowns.full(found.x)
+    com, inertia = arm.unknowns.mape(np.asarray(x))
+    averaged = arm.unknowns.mape(np.asarray(x).mean(axis=0))
     curves = np.asarray(found.history.best)
     aim = objective(reading, arm)
     return {
@@ -103,7 +98,7 @@ def judged(reading: Reading, arm: StudyArm, size: dict[str, int], mesh: Mesh | N
 def at_wall(x: np.ndarray, aim: identify.ParameterDistance) -> np.ndarray:
     """Which unknowns (s, u) end at an end of their box, or beyond."""
     lower, upper = np.asarray(aim.lower), np.asarray(aim.upper)
-    margin = ROUND_OFF * (upper - lower)
+    margin = 1e-9 * (upper - lower)  # round-off
     return (x <= lower + margin) | (x >= upper - margin)
 
 
@@ -114,18 +109,29 @@ def _round(values, digits: int = 5) -> list[float]:
 def run(config: Config, arm: StudyArm, readings: list[Reading]) -> list[dict]:
     """Judge the readings that the file of results lacks; all rows."""
     path = config.folder(arm) / "table3_swarms.jsonl"
-    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    done, mesh = {row["name"] for row in rows}, config.mesh
+    rows = _stored(path, config.size["seeds"])
+    done, mesh, commit = {row["name"] for row in rows}, config.mesh, made(config.said())["commit"]
     started = time.perf_counter()
     for number, reading in enumerate(readings):
         if str(reading) in done:
             continue
-        rows.append(judged(reading, arm, config.size, mesh))
+        rows.append(judged(reading, arm, config.size, mesh) | {"commit": commit})
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(rows[-1]) + "\n")
         if number % 100 == 0 or number == len(readings) - 1:
             print(f"{number + 1}/{len(readings)} readings, {time.perf_counter() - started:.0f} s", flush=True)
     return rows
+
+
+def _stored(path: pathlib.Path, seeds: int) -> list[dict]:
+    """Rows of an earlier run of this size; a last line that was cut off in the middle is cut off whole."""
+    if not path.exists():
+        return []
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    if whole != text:
+        path.write_text(whole, encoding="utf-8")
+    return [row for row in map(json.loads, whole.splitlines()) if len(row["com"]) == seeds]
 
 
 def baselines(arm: StudyArm, few: bool) -> list[dict]:
@@ -141,15 +147,15 @@ def baselines(arm: StudyArm, few: bool) -> list[dict]:
     }
     rows = []
     for name, way in itertools.islice(ways.items(), 2 if few else None):
-        com, inertia = arm.mape(np.asarray(arm.full(jax.block_until_ready(way()))))
+        com, inertia = arm.unknowns.mape(np.asarray(arm.unknowns.full(jax.block_until_ready(way()))))
         rows.append({"name": name, "com": float(com.max()), "inertia": float(inertia.max())})
     return rows
 
 
 def _possible(aim: identify.ParameterDistance, starts, arm: StudyArm):
     """Descent in the log-Cholesky numbers, from the possible ones among the starts."""
-    sought = jnp.asarray(np.flatnonzero(arm.searched))
-    numbers = jax.vmap(identify.log_cholesky, (0, None))(arm.full(starts), arm.mass)
+    sought = arm.unknowns.place
+    numbers = jax.vmap(identify.log_cholesky, (0, None))(arm.unknowns.full(starts), arm.mass)
     # Of impossible starts, none of which a body can have, the reference's numbers moved by half take the place.
     fallback = 0.5 * identify.log_cholesky(arm.x, arm.mass)
     numbers = jnp.where(jnp.isfinite(numbers).all(axis=1, keepdims=True), numbers, fallback)
@@ -162,12 +168,13 @@ def pair_of_sets(pair: dict[str, str], arm: StudyArm, size: dict[str, int]) -> d
     """All that the nearest pair of readings found: the sets that the control takes, and what figures 6 to 9 show."""
     by_name = {str(reading): reading for reading in (*all_readings(), *usual_readings())}
     told = {
-        "arm": arm.name, "joints": list(arm.whole.joint_names[: len(arm.links)]), "names": list(arm.names),
-        "reference": np.asarray(arm.x).tolist(), "searched": arm.searched.tolist(), "sets": {}, "runs": {}, "walls": {},
+        "arm": arm.name, "joints": [arm.whole.joint_names[i] for i in arm.links], "names": list(arm.unknowns.names),
+        "reference": np.asarray(arm.x).tolist(), "searched": list(arm.unknowns.sought),
+        "sets": {}, "runs": {}, "walls": {},
     }  # fmt: skip
     for family, name in pair.items():
         found = jax.block_until_ready(minima(by_name[name], arm, size))
-        told["sets"][family.upper()] = [_round(row, 9) for row in np.asarray(arm.full(found.x))]
+        told["sets"][family.upper()] = [_round(row, 9) for row in np.asarray(arm.unknowns.full(found.x))]
         told["walls"][family.upper()] = at_wall(np.asarray(found.x), objective(by_name[name], arm)).sum(axis=0).tolist()
         told["runs"][family.upper()] = {
             "reading": name, "fitness": _round(found.fitness),
@@ -181,12 +188,8 @@ def write_table(config: Config, arm: StudyArm) -> dict:
     folder = config.folder(arm)
     readings = config.readings(arm)
     by_name = {str(reading): reading for reading in readings}
-    earlier = pd.read_parquet(folder / EARLIER) if config.earlier and (folder / EARLIER).is_file() else None
-    kept = set() if earlier is None else set(earlier["reading"]) & set(by_name)
-    rows = run(config, arm, [reading for name, reading in by_name.items() if name not in kept])
-    rows = [row for row in rows if row["name"] in by_name]
-    kept -= {row["name"] for row in rows}
-    choices = readings_of(rows + ([] if earlier is None else _without_runs(earlier, kept, by_name)), earlier)
+    rows = [row for row in run(config, arm, readings) if row["name"] in by_name]
+    choices = readings_of(rows)
     pair = pair_of(judged_readings(runs_of(rows), choices))
     boxes = [other for row in pair.values() for other in in_other_boxes(by_name[row["reading"]])]
     names = {str(reading) for reading in boxes[:: 5 if config.smoke else 1]}
@@ -195,18 +198,10 @@ def write_table(config: Config, arm: StudyArm) -> dict:
     choices = pd.concat([choices, readings_of(in_boxes)], ignore_index=True)
     store(runs, folder / RUNS)
     store(choices, folder / READINGS)
-    head = {"made": made(config.said()), "config": config.said(), "arm": arm.name}
+    # The readings may have been run at several times.
+    own = made(config.said()) | {"commits": sorted(set(choices["commit"]))}
+    head = {"made": own, "config": config.said(), "arm": arm.name}
     return head | summary(judged_readings(runs, choices), baselines(arm, few=config.smoke), folder)
-
-
-def _without_runs(earlier: pd.DataFrame, kept: set[str], by_name: dict[str, Reading]) -> list[dict]:
-    """Readings of which only means are there."""
-    plateau = earlier.set_index("reading")["plateau_of_mean"]
-    return [
-        {"reading": dataclasses.asdict(by_name[name]), "name": name, "averaged": [math.nan, math.nan],
-         "plateau_of_mean": int(plateau[name])}
-        for name in earlier["reading"] if name in kept
-    ]  # fmt: skip
 
 
 def main(config: Config) -> None:

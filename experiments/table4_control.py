@@ -62,7 +62,7 @@ class Config(StudyConfig):
         seeds: Of the stored sets, so many.
         duration: Of the motion [s].
         dt: Step [s].
-        radius: Of the circle [m].
+        radius: Of the circle [m]; default 0.1, less for an arm that is too short for it.
         start_error: Offset of every joint at the start [rad or m], for rise, settling and overshoot to have a meaning.
         share: Of the disturbance: of each joint's largest torque along the motion, or of its momentary torque.
         frequency: Of the disturbance [Hz].
@@ -78,7 +78,7 @@ class Config(StudyConfig):
     seeds: int = 30
     duration: float = 30.0
     dt: float = 0.001
-    radius: float = 0.1
+    radius: float | None = None
     start_error: float = 0.1
     share: float = 0.4
     frequency: float = 1.0
@@ -156,18 +156,18 @@ def task_of(config: Config, arm: Robot) -> Task:
 
 def motion_of(config: Config, arm: Robot) -> tuple[control.Reference, str]:
     """The tool's circle; for an arm that can't follow it, a calm motion of its joints; and which, in words."""
-    # With six joints the tool points down: straight, as the IRB 140 is at zero, a wrist is singular.
-    posture = arm.reference.at[4].add(0.5 * jnp.pi) if arm.n == 6 else arm.reference
     try:
         reference = control.circle(
-            arm, duration=config.duration, dt=config.dt, radius=config.radius, posture=posture,
-            ramp=min(2.0, config.duration / 4.0),
-        )  # fmt: skip
+            arm, duration=config.duration, dt=config.dt, radius=config.radius, ramp=min(2.0, config.duration / 4.0)
+        )
     except InputError as reason:
         played = fourier_motion(arm, config.duration, 1.0 / config.dt, seed=0, speed=FOURIER_SPEED)
         reference = control.Reference(*map(jnp.asarray, (played.t, played.q, played.qd, played.qdd)))
         return reference, f"a Fourier motion of the joints, as the circle is not possible ({reason})"
-    return reference, f"a level circle of {config.radius:g} m radius in {config.duration:g} s"
+    tool = np.asarray(_tool(arm, reference.q))
+    radius = 0.5 * float(np.linalg.norm(tool - tool[0], axis=1).max())
+    level = "level " * bool(np.ptp(tool[:, 2]) < 1e-6 * radius)
+    return reference, f"a {level}circle of {radius:.3g} m radius in {config.duration:g} s"
 
 
 def runs_of(config: Config, task: Task, law: tuple):

@@ -53,29 +53,23 @@ class Config(StudyConfig):
 SMOKE = ("PSO, w 0.99", "Levenberg-Marquardt, box as prior", "least squares, base parameters")
 
 
-class Unknowns(eqx.Module):
+class TorqueError(eqx.Module):
     """A fit as a function of what is sought of its parameters.
 
     Attributes:
         fit: Of all parameters of the links.
-        x: These parameters; those sought are overwritten.
-        place: Where those sought stand in x.
+        unknowns: Which of these are sought.
     """
 
     fit: identify.LinearFit
-    x: Float[Array, " d"]
-    place: Array
+    unknowns: identify.Unknowns
 
-    def __call__(self, unknowns: Float[Array, " u"], progress: Scalar) -> Scalar:
-        return self.fit(self.all(unknowns), progress)
+    def __call__(self, sought: Float[Array, " u"], progress: Scalar) -> Scalar:
+        return self.fit(self.unknowns.full(sought), progress)
 
-    def residual(self, unknowns: Float[Array, " u"]) -> Float[Array, " m"]:
+    def residual(self, sought: Float[Array, " u"]) -> Float[Array, " m"]:
         """What least squares minimises."""
-        return self.fit.residual(self.all(unknowns))
-
-    def all(self, unknowns: Float[Array, " u"]) -> Float[Array, " d"]:
-        """All parameters."""
-        return self.x.at[self.place].set(unknowns)
+        return self.fit.residual(self.unknowns.full(sought))
 
 
 def recorded(robot: Robot, duration: float, noise: float, seed: int) -> Trajectory:
@@ -121,7 +115,7 @@ class BoxedResidual(eqx.Module):
     Uniform in the box means a standard deviation of its width / sqrt(12).
     """
 
-    aim: Unknowns
+    aim: TorqueError
     lower: Float[Array, " u"]
     upper: Float[Array, " u"]
 
@@ -131,15 +125,15 @@ class BoxedResidual(eqx.Module):
         return jnp.concatenate([self.aim.residual(x), noise * apart])
 
 
-def ways(aim: Unknowns, lower, upper, config: Config) -> dict[str, Callable[[], Float[Array, "s m"]]]:
+def ways(aim: TorqueError, lower, upper, config: Config) -> dict[str, Callable[[], Float[Array, "s m"]]]:
     """Every way to estimate, as functions that give inertial parameters (s, 10 k)."""
     keys, fit = swarm.seed_keys(config.seeds), aim.fit
     size: dict[str, Any] = {"particles": 12, "iterations": 10} if config.smoke else {}
-    phi = jax.jit(jax.vmap(lambda u: identify.phi_of(aim.all(u), fit.mass).ravel()))
+    phi = jax.jit(jax.vmap(lambda u: identify.phi_of(aim.unknowns.full(u), fit.mass).ravel()))
     starts = lower + (upper - lower) * jax.random.uniform(jax.random.key(1), (config.seeds, len(lower)))
     scale = jnp.abs(upper - lower)
     middle = 0.5 * (lower + upper)
-    numbers = _possible_numbers(jax.vmap(aim.all)(starts), aim.all(middle), fit.mass)
+    numbers = _possible_numbers(aim.unknowns.full(starts), aim.unknowns.full(middle), fit.mass)
 
     def possible() -> Float[Array, "s m"]:
         found = identify.descents(PossibleResidual(fit), numbers, max_steps=100).x
@@ -171,17 +165,16 @@ def _possible_numbers(starts, middle, mass) -> Float[Array, "s d"]:
 def run(config: Config, study: StudyArm) -> dict:
     """All ways on one recording, judged on another."""
     robot, links = study.whole, study.links
-    place = jnp.asarray(np.flatnonzero(study.searched))
     where = jnp.asarray(np.random.default_rng(0).uniform(size=study.x.shape))
-    lower, upper = (end[place] for end in identify.box(study.x, config.width, place=where))
+    lower, upper = study.unknowns.box(config.width, place=where)
     duration = 3.0 if config.smoke else config.duration
     fit = identify.linear_fit(robot, links, recorded(robot, duration, config.noise, seed=1))
     unseen = identify.linear_fit(robot, links, recorded(robot, duration, 0.0, seed=2))
-    aim = Unknowns(fit, study.x, place)
+    aim = TorqueError(fit, study.unknowns)
     tried = ways(aim, lower, upper, config)
     tried = {name: tried[name] for name in SMOKE} if config.smoke else tried
     rows = [_row(name, way, fit, unseen, study) for name, way in tried.items()]
-    middle = identify.phi_of(aim.all(0.5 * (lower + upper)), fit.mass).ravel()
+    middle = identify.phi_of(aim.unknowns.full(0.5 * (lower + upper)), fit.mass).ravel()
     truth = identify.phi_of(study.x, fit.mass).ravel()
     bounds = {"middle of the box": float(unseen.of_phi(middle)), "noise": float(fit.of_phi(truth))}
     return {"bounds": bounds, "rows": rows}
@@ -197,7 +190,7 @@ def _row(name: str, way: Callable, fit: identify.LinearFit, unseen: identify.Lin
     seen, held_out = (np.asarray(jax.vmap(f.of_phi)(phi)) for f in (fit, unseen))
     best = int(np.argmin(np.where(np.isnan(seen), np.inf, seen)))
     x = np.asarray(jax.vmap(_parameters)(phi))
-    com, inertia = study.mape(x)
+    com, inertia = study.unknowns.mape(x)
     mass = phi.reshape(len(phi), -1, 10)[:, :, 0]
     possible = jax.vmap(identify.consistency)(jnp.asarray(x), mass).pseudo_inertia
     return {

@@ -8,36 +8,55 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from study_statistics import said  # noqa: E402
 
 matplotlib.rcParams["svg.hashsalt"] = "irb140"
 
 
 def page(result: dict) -> str:
     """What each objective identifies, and what none can."""
-    return f"# Swarms judged by the closed loop: {result['arm']}\n\n{table(result)}\n\n{said_of_seen(result)}\n"
+    parts = [table(result), said_of_seen(result)]
+    if result["circle"]:
+        parts += ["Along the circle:", table(result["circle"]), said_of_seen(result["circle"])]
+    parts = [f"# Swarms judged by the closed loop: {result['arm']}", *parts, said_of_tests(result)]
+    return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def table(result: dict) -> str:
-    """Errors and measures of every search, the truth above."""
+    """Errors and measures of every search along one motion, the truth above."""
     head = (
         "| minimised | by | COM MAPE % | inertia MAPE % | tracking, mrad | roughness, N m/s | energy, J | "
         "tracking elsewhere, mrad | torque elsewhere, N m |"
     )
     truth, unseen = result["truth"], result["truth_unseen"]
-    lines = [head, "|---" * 9 + "|", _line("the true parameters", "", (0.0, 0.0), truth, unseen, 0.0)]
+    lines = [head, "|---" * 9 + "|", _line("the true parameters", "", ("0", "0"), truth, unseen, 0.0)]
     for row in result["rows"]:
-        errors = row["com"], row["inertia"]
+        errors = tuple(_with_spread(row[key], row[f"{key}_sd"], row["runs"]) for key in ("com", "inertia"))
         lines.append(
             _line(row["objective"], row["algorithm"], errors, row["measures"], row["unseen"], row["torque_rmse"])
         )
     return "\n".join(lines)
 
 
-def _line(name: str, by: str, errors: tuple[float, float], own: dict, other: dict, torque: float) -> str:
+def _with_spread(mean: float, deviation: float, runs: int) -> str:
+    return f"{mean:.3g} ± {deviation:.2g}" if runs > 1 else f"{mean:.3g}"
+
+
+def _line(name: str, by: str, errors: tuple[str, ...], own: dict, other: dict, torque: float) -> str:
     return (
-        f"| {name} | {by} | {errors[0]:.3g} | {errors[1]:.3g} | {1e3 * own['tracking']:.4g} | "
+        f"| {name} | {by} | {errors[0]} | {errors[1]} | {1e3 * own['tracking']:.4g} | "
         f"{own['smoothness']:.5g} | {own['energy']:.5g} | {1e3 * other['tracking']:.4g} | {torque:.3g} |"
     )
+
+
+def said_of_tests(result: dict) -> str:
+    """QPSO against PSO at each objective."""
+    words = {"com": "centres of mass", "inertia": "inertias", "torque_rmse": "torque elsewhere"}
+    lines = []
+    for test in result["tests"]:
+        about, _, key = test["name"].removesuffix(", QPSO lower than PSO").rpartition(": ")
+        lines.append(f"- {about}: {words[key]}, n = {test['n'][0]}: {said(test)}")
+    return "Is QPSO's error lower than PSO's?\n\n" + "\n".join(lines) if lines else ""
 
 
 def said_of_seen(result: dict) -> str:
@@ -48,7 +67,7 @@ def said_of_seen(result: dict) -> str:
     whole = [name for name, s in zip(names, share, strict=True) if s > 1.0 - 1e-6]
     return (
         f"Of {len(names)} unknowns the closed loop shows {told['tracking']['rank']} combinations, torque itself "
-        f"{told['torque']['rank']}, along this motion; a change of 10 % shows above the encoder's 0.01° in "
+        f"{told['torque']['rank']}, along this motion; a change of 10 % shows above 0.01° of a joint in "
         f"{told['above_encoder']}.  Not seen at all: {', '.join(blind) or 'none'}.  "
         f"Seen alone, not only in combination with others: {', '.join(whole) or 'none'}."
     )

@@ -3,15 +3,21 @@
     python experiments/tracking_swarms.py [--robot arm.xml] [--joints n] [--smoke]
 
 A candidate is what the controller believes of the arm; the arm itself is the true one.  Each candidate drives the arm
-along a lively motion for some seconds.  Two questions: what do these objectives identify, and which parameters can no
-closed loop see?  Every search is stored when it is done.  Writes tracking_swarms.json and .md, and figure_tracking.svg.
+along a lively motion for some seconds; those of the study's own arm also along the circle of 30 s, with as many seeds
+as the whole leaves time for in 25 minutes of one core.  Two questions: what do these objectives identify, and which
+parameters can no closed loop see?  Every search is stored when it is done.  Writes tracking_runs.parquet (one row a
+run), tracking_swarms.json and .md, and figure_tracking.svg.
 """
+# pandas types every column as all that it might be.
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
 
 import dataclasses
 import hashlib
 import itertools
 import json
 import pathlib
+import time
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
@@ -20,14 +26,16 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pandas as pd
 import tyro
 from jaxtyping import Array, Float
 from study_arm import StudyArm, StudyConfig
-from study_provenance import made
-from study_readings import ITERATIONS, PARTICLES, Reading, rule
+from study_provenance import made, store
+from study_readings import ITERATIONS, PARTICLES, SEEDS, Reading, rule
+from study_statistics import Test, tested
 from tracking_report import figure, page
 
-from irb140_jax import control, identify, simulate, swarm
+from irb140_jax import control, simulate, swarm
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.dynamics import regressor_batch
 from irb140_jax.recordings.excite import fourier_motion
@@ -44,6 +52,10 @@ RULES = {
 ENCODER = np.radians(0.01)  # [rad] resolution of the IRB 140's joints by its specification
 VISIBLE_CHANGE = 0.1  # share by which parameters change when visibility is asked: between PSO's error and the box
 ROUND_OFF = 1e-9  # share of the largest singular value below which a direction is not there at all
+FILE = "tracking_runs.parquet"
+FOURIER, CIRCLE = "Fourier motion", "circle"
+FEWEST = 10  # runs of a search of which a test can say anything after Holm's correction
+MEASURES = ("tracking", "smoothness", "energy")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,13 +69,19 @@ class Config(StudyConfig):
             half a milliradian, is not zero at the truth, so that tracking would lead away from it.
         width: Half of the box's width, as a fraction of the truth.
         speed: Of the motion, as a share of the joints' largest speeds.
+        circle_seeds: Runs of each search for tracking along the circle; the study's own arm only.
+        circle_duration: Of the circle [s].
+        circle_dt: Half of a step there [s]; the motion is so calm that the error is a ten-thousandth of a candidate's.
     """
 
-    seeds: int = 6
+    seeds: int = SEEDS
     duration: float = 1.6
     dt: float = 0.002
     width: float = 0.5
     speed: float = 0.6
+    circle_seeds: int = 4
+    circle_duration: float = 30.0
+    circle_dt: float = 0.004
 
     @property
     def size(self) -> dict[str, Any]:
@@ -112,7 +130,6 @@ class Loop:
             "energy": jnp.sum(energy[-1]),
         }  # fmt: skip
 
-
     @cached_property
     def measures_of(self) -> Callable[[Float[Array, "s d"]], dict[str, Float[Array, " s"]]]:
         """Of many sets at once, compiled once."""
@@ -121,11 +138,25 @@ class Loop:
 
 def loop_of(config: Config, study: StudyArm, seed: int) -> Loop:
     """A Fourier motion of the first joints."""
+    plant = plant_of(study)
+    played = fourier_motion(plant, config.duration, 1.0 / config.dt, seed=seed, speed=config.speed)
+    return _loop(study, plant, control.Reference(*map(jnp.asarray, (played.t, played.q, played.qd, played.qdd))))
+
+
+def circle_loop_of(config: Config, study: StudyArm) -> Loop:
+    """The circle of the tool, as in Table 4."""
+    plant = plant_of(study)
+    return _loop(study, plant, control.circle(plant, duration=config.circle_duration, dt=config.circle_dt))
+
+
+def plant_of(study: StudyArm) -> Robot:
+    """The true arm; the study's has no rotors."""
     plant = study.reduced()
     rotors = plant.armature if not study.is_studys else jnp.zeros(plant.n)
-    plant = eqx.tree_at(lambda r: r.armature, plant, rotors)
-    played = fourier_motion(plant, config.duration, 1.0 / config.dt, seed=seed, speed=config.speed)
-    reference = control.Reference(*map(jnp.asarray, (played.t, played.q, played.qd, played.qdd)))
+    return eqx.tree_at(lambda r: r.armature, plant, rotors)
+
+
+def _loop(study: StudyArm, plant: Robot, reference: control.Reference) -> Loop:
     regressor = np.asarray(regressor_batch(plant, reference.q, reference.qd, reference.qdd))
     return Loop(study, plant, reference, regressor)
 
@@ -134,7 +165,7 @@ def objective(name: str, loop: Loop, truth: dict[str, float]) -> Callable[[Float
     """Fitness of the unknowns: one measure, or all three, each as a multiple of what the true model reaches."""
 
     def fitness(unknowns: Float[Array, " u"], progress: Scalar) -> Scalar:
-        measures = loop.measures(loop.study.full(unknowns))
+        measures = loop.measures(loop.study.unknowns.full(unknowns))
         return measures[name] if name in measures else jnp.sum(jnp.stack([measures[k] / truth[k] for k in measures]))
 
     return fitness
@@ -146,15 +177,14 @@ def seen(loop: Loop) -> dict:
     A parameter's share is the squared length of its projection onto the directions that show at all; torque's own
     share, through the regressor along the same motion, stands beside it.
     """
-    study, x = loop.study, loop.study.x
-    sought = np.flatnonzero(study.searched)
-    size = jnp.abs(x[sought])
+    study = loop.study
+    place, size = study.unknowns.place, jnp.abs(study.unknowns.start)
     # Derivatives by the simpler integrator: its own error does not depend on what the controller believes.
-    errors = lambda y: loop.motion(study.full(y * size), simulate.SemiImplicitEuler()).q.ravel()  # noqa: E731
-    J = np.asarray(jax.jit(jax.jacfwd(errors))(x[sought] / size))
-    torques = lambda y: loop.torque(study.full(y * size)).ravel()  # noqa: E731
-    Y = np.asarray(jax.jit(jax.jacfwd(torques))(x[sought] / size))
-    told: dict[str, Any] = {"names": [study.names[i] for i in sought]}
+    errors = lambda y: loop.motion(study.unknowns.full(y * size), simulate.SemiImplicitEuler()).q.ravel()  # noqa: E731
+    J = np.asarray(jax.jit(jax.jacfwd(errors))(study.unknowns.start / size))
+    torques = lambda y: loop.torque(study.unknowns.full(y * size)).ravel()  # noqa: E731
+    Y = np.asarray(jax.jit(jax.jacfwd(torques))(study.unknowns.start / size))
+    told: dict[str, Any] = {"names": [study.unknowns.names[i] for i in place]}
     for name, matrix in (("tracking", J), ("torque", Y)):
         _, values, directions = np.linalg.svd(matrix, full_matrices=False)
         shown = values > ROUND_OFF * values[0]
@@ -169,69 +199,119 @@ def seen(loop: Loop) -> dict:
 
 
 def search(config: Config, loop: Loop, name: str, algorithm: str, truth: dict[str, float]) -> dict[str, np.ndarray]:
-    """What the seeds of one search found."""
-    study = loop.study
-    place = jnp.asarray(np.random.default_rng(0).uniform(size=study.x.shape))
-    lower, upper = (end[study.searched] for end in identify.box(study.x, config.width, place=place))
+    """What the seeds of one search found, the processor time that it took [s], and the commit that ran it."""
+    study, started = loop.study, time.process_time()
+    lower, upper = box_of(config, study)
     found = swarm.minimise(
         objective(name, loop, truth), RULES[algorithm], lower, upper, keys=swarm.seed_keys(config.seeds), **config.size
     )
-    return {"x": np.asarray(study.full(found.x)), "fitness": np.asarray(found.fitness)}
+    x, fitness = np.asarray(study.unknowns.full(found.x)), np.asarray(found.fitness)
+    commit = made(config.said())["commit"]
+    return {"x": x, "fitness": fitness, "seconds": np.array(time.process_time() - started), "commit": np.array(commit)}
 
 
-def judged(name: str, algorithm: str, x: np.ndarray, loops: tuple[Loop, Loop]) -> dict:
-    """One row: errors of the parameters, and what the set does in the loop that was searched and in another."""
+def box_of(config: Config, study: StudyArm) -> tuple[Float[Array, " u"], Float[Array, " u"]]:
+    """Where the candidates lie; the truth is not in its middle."""
+    place = np.random.default_rng(0).uniform(size=study.x.shape)
+    return study.unknowns.box(config.width, place=jnp.asarray(place))
+
+
+def judged(name: str, algorithm: str, x: np.ndarray, loops: tuple[Loop, Loop]) -> pd.DataFrame:
+    """One row a run: errors of the parameters, and what the set does in the loop that was searched and in another."""
     study = loops[0].study
-    com, inertia = study.mape(x)
+    com, inertia = study.unknowns.mape(x)
     own, other = (loop.measures_of(jnp.asarray(x)) for loop in loops)
-    mean = lambda values: float(np.mean(np.asarray(values)))  # noqa: E731
     tau, true = (np.asarray(jax.vmap(loops[1].torque)(jnp.asarray(y))) for y in (x, np.asarray(study.x)[None]))
-    return {
-        "objective": name, "algorithm": algorithm, "com": mean(com), "inertia": mean(inertia),
-        "runs": {"com": com.tolist(), "inertia": inertia.tolist(),
-                 **{key: np.asarray(value).tolist() for key, value in own.items()}},
-        "measures": {key: mean(value) for key, value in own.items()},
-        "unseen": {key: mean(value) for key, value in other.items()},
-        "torque_rmse": float(np.sqrt(np.mean((tau - true) ** 2))),
-    }  # fmt: skip
+    told = {"objective": name, "algorithm": algorithm, "seed": np.arange(len(x)), "com": com, "inertia": inertia}
+    told |= {key: np.asarray(value) for key, value in own.items()}
+    told |= {f"unseen_{key}": np.asarray(value) for key, value in other.items()}
+    return pd.DataFrame(told | {"torque_rmse": np.sqrt(np.mean((tau - true) ** 2, axis=(1, 2)))})
 
 
-def run(config: Config, study: StudyArm) -> dict:
-    """All searches, those stored already taken from there; the truth and the box's middle beside them."""
+def run(config: Config, study: StudyArm) -> tuple[pd.DataFrame, dict]:
+    """All searches, one row a run, and what is told of each motion."""
     first = loop_of(config, study, seed=1)
-    loops = first, first if config.smoke else loop_of(config, study, seed=2)
+    other = first if config.smoke else loop_of(config, study, seed=2)
+    tried = [("tracking", "PSO")] if config.smoke else list(itertools.product(OBJECTIVES, RULES))
+    parts = {FOURIER: (config, (first, other), tried)}
+    if study.is_studys and not config.smoke and config.circle_seeds:
+        own = dataclasses.replace(config, seeds=config.circle_seeds)
+        parts[CIRCLE] = own, (circle_loop_of(config, study), other), [("tracking", algorithm) for algorithm in RULES]
+    frames, told = [], {}
+    for motion, (own, loops, searches) in parts.items():
+        frame, told[motion] = _run(motion, own, loops, searches)
+        frames.append(frame.assign(motion=motion))
+    return pd.concat(frames, ignore_index=True), told
+
+
+def _run(motion: str, config: Config, loops: tuple[Loop, Loop], searches: list) -> tuple[pd.DataFrame, dict]:
+    """The searches along one motion, those stored taken from there; the truth and the box's middle beside them."""
+    study = loops[0].study
     alike = lambda x: jnp.tile(jnp.asarray(x), (config.seeds, 1))  # noqa: E731  in the shape that is compiled anyway
     truth, unseen = (
         {key: float(value[0]) for key, value in loop.measures_of(alike(study.x)).items()} for loop in loops
     )
     folder = config.folder(study) / "tracking_runs"
     folder.mkdir(exist_ok=True)
-    mark = hashlib.sha256(repr((config.said(), np.asarray(study.x).tolist())).encode()).hexdigest()
+    mark = _mark(config, loops[0])
+    frames, seconds, commits = [], [], set()
+    for name, algorithm in searches:
+        path = folder / f"{motion}_{name}_{algorithm}.npz".replace(" ", "_")
+        found = _stored(path, mark, lambda n=name, a=algorithm: search(config, loops[0], n, a, truth))
+        frames.append(judged(name, algorithm, found["x"], loops))
+        seconds.append(float(found["seconds"]))
+        commits.add(str(found["commit"]))
+        print(f"  done: {motion}, {name}, {algorithm}", flush=True)
+    middle = np.asarray(alike(study.unknowns.full(0.5 * sum(box_of(config, study)))))
+    frames.append(judged("middle of the box", "", middle, loops).iloc[:1])
+    told = {"truth": truth, "truth_unseen": unseen, "seeds": config.seeds, "seconds": sum(seconds)}
+    told |= {"commits": sorted(commits), "seen": seen(loops[0])}
+    return pd.concat(frames, ignore_index=True), told
+
+
+def rows_of(frame: pd.DataFrame) -> list[dict]:
+    """One row a search: means of its runs, deviations of the errors."""
     rows = []
-    tried = [("tracking", "PSO")] if config.smoke else itertools.product(OBJECTIVES, RULES)
-    for name, algorithm in tried:
-        path = folder / f"{name.replace(' ', '_')}_{algorithm}.npz"
-        x = _stored(path, mark, lambda n=name, a=algorithm: search(config, loops[0], n, a, truth))
-        rows.append(judged(name, algorithm, x, loops))
-        print(f"  done: {name}, {algorithm}", flush=True)
-    place = np.random.default_rng(0).uniform(size=study.x.shape)
-    lower, upper = identify.box(study.x, config.width, place=jnp.asarray(place))
-    middle = judged("middle of the box", "", np.asarray(alike(0.5 * (lower + upper))), loops)
-    return {
-        "arm": study.name, "truth": truth, "truth_unseen": unseen, "rows": [*rows, middle], "seen": seen(loops[0]),
-    }  # fmt: skip
+    for (objective, algorithm), runs in frame.groupby(["objective", "algorithm"], sort=False):
+        mean = runs.drop(columns=["objective", "algorithm", "seed", "motion"]).mean()
+        row = {"objective": objective, "algorithm": algorithm, "runs": len(runs)}
+        row |= {key: float(mean[key]) for key in ("com", "inertia", "torque_rmse")}
+        row |= {f"{key}_sd": float(runs[key].std()) if len(runs) > 1 else 0.0 for key in ("com", "inertia")}
+        row["measures"] = {key: float(mean[key]) for key in MEASURES}
+        rows.append(row | {"unseen": {key: float(mean[f"unseen_{key}"]) for key in MEASURES}})
+    return rows
 
 
-def _stored(path: pathlib.Path, mark: str, compute: Callable[[], dict[str, np.ndarray]]) -> np.ndarray:
-    """The sets of a search, computed unless they are stored for the same choices."""
+def tests_of(frame: pd.DataFrame) -> list[Test]:
+    """QPSO against PSO at each objective with enough runs, by what the sets are worth: their errors, unseen torque."""
+    searches = frame.loc[frame["algorithm"] == "QPSO"].groupby(["motion", "objective"], sort=False).size()
+    of = lambda motion, objective, by: (("motion", motion), ("objective", objective), ("algorithm", by))  # noqa: E731
+    return [
+        Test("tracking", f"{motion}, {name}: {key}, QPSO lower than PSO", FILE, key, of(motion, name, "QPSO"),
+             of(motion, name, "PSO"))
+        for motion, name in searches[searches >= FEWEST].index
+        for key in ("com", "inertia", "torque_rmse")
+    ]  # fmt: skip
+
+
+def _mark(config: Config, loop: Loop) -> str:
+    """What a stored search depends on, in one number."""
+    digest = hashlib.sha256(repr((config.seeds, config.width, config.size)).encode())
+    for leaf in (loop.study.x, *jax.tree.leaves((loop.plant, loop.reference))):
+        digest.update(np.ascontiguousarray(leaf).tobytes())
+    return digest.hexdigest()
+
+
+def _stored(path: pathlib.Path, mark: str, compute: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """What a search found, computed unless it is stored for the same choices."""
     if path.is_file():
         with np.load(path) as there:
             if str(there["mark"]) == mark:
-                return there["x"]
+                return dict(there)
     found, part = compute(), path.with_suffix(".part.npz")
-    np.savez(part, mark=np.array(mark), x=found["x"], fitness=found["fitness"])
+    np.savez(part, mark=np.array(mark), **found)
     part.replace(path)
-    return found["x"]
+    return found
 
 
 def main(config: Config) -> None:
@@ -240,7 +320,12 @@ def main(config: Config) -> None:
     config = dataclasses.replace(config, seeds=2, duration=0.2) if config.smoke else config
     study = config.arm()
     folder = config.folder(study)
-    result = {"made": made(config.said()), "config": config.said()} | run(config, study)
+    frame, told = run(config, study)
+    store(frame, folder / FILE)
+    motions = {motion: part | {"rows": rows_of(frame[frame["motion"] == motion])} for motion, part in told.items()}
+    own = made(config.said()) | {"commits": sorted({commit for part in told.values() for commit in part["commits"]})}
+    result = {"made": own, "config": config.said(), "arm": study.name, **motions.pop(FOURIER)}
+    result |= {"circle": motions.get(CIRCLE), "tests": tested(tests_of(frame), folder)}
     (folder / "tracking_swarms.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     (folder / "tracking_swarms.md").write_text(page(result), encoding="utf-8")
     figure(result, config.figure_folder(study) / "figure_tracking.svg")

@@ -8,9 +8,9 @@ import pytest
 from helpers import IRB140_XML, random_robot, random_state, shipped_robot
 
 from irb140_jax import control, dynamics, kinematics
-from irb140_jax.errors import InputError
+from irb140_jax.errors import InputError, RobotError
 from irb140_jax.oracle import mujoco as oracle
-from irb140_jax.robot import first_joints
+from irb140_jax.robot import first_joints, robot_from_model, subset
 
 WHOLE, _ = shipped_robot()
 ARM = first_joints(WHOLE, 3)
@@ -124,8 +124,77 @@ def test_a_circle_that_can_not_be_is_refused(wrong):
 
 
 def test_a_path_for_two_joints_is_refused_with_what_would_do():
-    with pytest.raises(InputError, match="first_joints"):
+    with pytest.raises(InputError, match="joints' own motion as a Reference"):
         control.circle(first_joints(WHOLE, 2), duration=4.0, dt=0.01)
+
+
+def planar_arm():
+    """Three hinges about one axis, which stands askew."""
+    link = '<geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/>'
+    joint = lambda i: f'<joint name="joint{i}" axis="0 0 1" range="-2 2"/>'  # noqa: E731
+    hand = f'<body pos="0.3 0 0">{joint(3)}{link}<site name="tool" pos="0.3 0 0"/></body>'
+    arm = f'<body euler="0.5 0.3 0">{joint(1)}{link}<body pos="0.3 0 0">{joint(2)}{link}{hand}</body></body>'
+    text = f'<mujoco><compiler angle="radian"/><worldbody>{arm}</worldbody></mujoco>'
+    return robot_from_model(mujoco.MjModel.from_xml_string(text), "planar")
+
+
+ARMS = {
+    "six joints, wrist straight at the reference": lambda: WHOLE,
+    "seven joints, one too many": lambda: random_robot("HHHHHHH", 3)[0],
+    "four joints, one a slide": lambda: random_robot("HSHH", 5)[0],
+    "three joints in one plane": planar_arm,
+}
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_any_arm_gets_a_circle_which_its_joints_follow_smoothly(arm):
+    robot, dt = ARMS[arm](), 0.005
+    reference = control.circle(robot, duration=2.0, dt=dt, ramp=1.0)
+    T = np.asarray(jax.vmap(kinematics.forward_kinematics, in_axes=(None, 0))(robot, reference.q))
+    # Evenly in angle, not in time: the middle of the circle is the middle of what is furthest apart.
+    points = T[:, :3, 3]
+    apart = np.linalg.norm(points - points[0], axis=1)
+    middle = 0.5 * (points[0] + points[apart.argmax()])
+    radius = np.linalg.norm(points - middle, axis=1)
+    # The sample that is furthest away misses the opposite end by up to half a step of 2 %.
+    assert radius.min() > 0.02 and np.ptp(radius) < 0.03 * radius.mean()
+    normal = np.linalg.svd(points - points.mean(axis=0))[2][2]
+    assert np.abs((points - points[0]) @ normal).max() < 1e-9
+    if robot.n >= 6:
+        assert np.allclose(T[:, :3, :3], T[0, :3, :3], atol=1e-9)
+    for x, rate in ((reference.q, reference.qd), (reference.qd, reference.qdd)):
+        # Central differences: off by dt^2 / 6 times a rate's second derivative.
+        error = np.abs((x[2:] - x[:-2]) / (2.0 * dt) - rate[1:-1]).max()
+        assert error < 0.01 * np.abs(rate).max()
+    assert bool(jnp.all((reference.q >= robot.lower) & (reference.q <= robot.upper)))
+
+
+def test_the_study_s_arm_starts_its_circle_at_its_reference(short_circle):
+    np.testing.assert_allclose(short_circle.q[0], ARM.reference, atol=1e-12)
+
+
+@pytest.mark.parametrize("joints", [(1, 3, 4), ("joint5", "joint2"), (0, 2, 5)])
+def test_any_choice_of_joints_is_mujocos_arm_with_the_others_removed(joints):
+    spec = mujoco.MjSpec.from_file(str(IRB140_XML))
+    keep = sorted(int(joint[-1]) - 1 if isinstance(joint, str) else joint for joint in joints)
+    for actuator in list(spec.actuators):
+        spec.delete(actuator)
+    for i in set(range(6)) - set(keep):
+        spec.delete(spec.joint(f"joint{i + 1}"))
+    model, arm = oracle.oracle_model(spec.compile()), subset(WHOLE, joints)
+    assert arm.joint_names == tuple(f"joint{i + 1}" for i in keep)
+    for seed in range(3):
+        q, qd, qdd = random_state(len(keep), seed)
+        tau = dynamics.inverse_dynamics(arm, *(jnp.asarray(x) for x in (q, qd, qdd)))
+        assert np.allclose(tau, oracle.inverse_dynamics(model, q, qd, qdd), atol=ROUND_OFF)
+        T = kinematics.forward_kinematics(arm, jnp.asarray(q))
+        assert np.allclose(T, oracle.forward_kinematics(model, q), atol=1e-13)
+
+
+@pytest.mark.parametrize("joints", [(), (0, 0), (6,), ("joint7",), ("joint1", 0)])
+def test_a_choice_of_joints_that_are_not_there_or_twice_is_refused(joints):
+    with pytest.raises(RobotError, match="none twice"):
+        subset(WHOLE, joints)
 
 
 def test_first_joints_are_mujocos_arm_with_the_other_joints_removed():

@@ -241,6 +241,59 @@ def test_mape_is_equation_30_by_groups():
     np.testing.assert_allclose([com, inertia], [2.0, 5.0], rtol=1e-9)
 
 
+def test_what_is_zero_has_no_percentage_and_leaves_that_of_the_rest_as_it_is():
+    x = np.asarray(REFERENCE).copy()
+    x[[1, 10]] = 0.0  # cy1, Ixy1
+    x[14] = 1e-12 * x[9]  # Izz1 beside Ixx1: round-off of a file reader
+    estimate = np.where(np.arange(27) < 9, 1.02, 0.95) * x + 1e-3 * np.isin(np.arange(27), (1, 10, 14))
+    np.testing.assert_allclose(identify.mape(estimate, x), [2.0, 5.0], rtol=1e-9)
+
+
+def test_an_error_that_is_not_defined_is_nan_and_the_other_a_number():
+    x = np.asarray(REFERENCE).copy()
+    x[:9] = 0.0
+    com, inertia = identify.mape(np.stack([1.1 * x, x]), x)
+    assert com.shape == (2,) and np.isnan(com).all()
+    np.testing.assert_allclose(inertia, [10.0, 0.0], atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def without_products():
+    """The robot with centres on the joint axes' x and no product of inertia."""
+    com = ROBOT.com * jnp.array([1.0, 0.0, 0.0])
+    return eqx.tree_at(lambda r: (r.com, r.inertia), ROBOT, (com, ROBOT.inertia * jnp.eye(3)))
+
+
+def test_unknowns_leave_out_what_is_zero_and_keep_the_rest_in_its_place(without_products):
+    unknowns = identify.unknowns(without_products, LINKS)
+    names = [name for name, sought in zip(unknowns.names, unknowns.sought, strict=True) if sought]
+    assert names == ["cx1", "cx2", "cx3"] + [f"I{a}{a}{i}" for i in (1, 2, 3) for a in "xyz"]
+    moved = unknowns.full(1.3 * unknowns.start)
+    np.testing.assert_array_equal(moved, jnp.where(jnp.array(unknowns.sought), 1.3 * unknowns.reference, 0.0))
+    np.testing.assert_allclose(unknowns.mape(np.asarray(moved)), [30.0, 30.0], rtol=1e-12)
+    assert unknowns.full(jnp.ones((4, 12))).shape == (4, 27)
+
+
+@pytest.mark.parametrize("units", ["normalised", "si", "mm", "mm_all"])
+def test_equation_20_of_the_unknowns_is_that_of_all_parameters_that_are_not_zero(without_products, units):
+    unknowns, place = identify.unknowns(without_products, LINKS), jnp.linspace(0.1, 0.9, 27)
+    objective = unknowns.distance(0.5, place=place, units=units)
+    com, inertia = {"normalised": (0, 0), "si": (1, 1), "mm": (1e3, 1), "mm_all": (1e3, 1e6)}[units]
+    square = np.asarray((0.2 * unknowns.reference) ** 2)
+    expected = 12 * 0.04 if units == "normalised" else com**2 * square[:9].sum() + inertia**2 * square[9:].sum()
+    # At weight zero, as 1.2 may lie beyond the box.
+    np.testing.assert_allclose(objective(1.2 * unknowns.start, jnp.asarray(0.0)), expected, rtol=1e-12)
+    lower, upper = identify.box(unknowns.reference, 0.5, place=place)
+    np.testing.assert_array_equal(objective.lower, lower[unknowns.place])
+    np.testing.assert_array_equal(objective.upper, upper[unknowns.place])
+
+
+def test_all_parameters_with_a_zero_are_refused_with_what_would_do(without_products):
+    x = identify.link_parameters(without_products, LINKS)
+    with pytest.raises(InputError, match="identify.unknowns"):
+        identify.parameter_distance(x, *identify.box(x, 0.5))
+
+
 def test_a_plateau_is_where_the_curve_has_fallen():
     best = np.concatenate([np.linspace(10.0, 1.0, 28), np.full(100, 1.0)])
     assert identify.plateau(best) == 27

@@ -1,12 +1,17 @@
 """The whole study in one command, as small as can be."""
 
 import contextlib
+import dataclasses
 import io
 import json
+import math
 import pathlib
 import re
+import shutil
 import sys
+from typing import Any
 
+import pandas as pd
 import pytest
 
 from irb140_jax.recordings.conceal import random_robot
@@ -14,6 +19,7 @@ from irb140_jax.recordings.conceal import random_robot
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "experiments"))
 
 import reproduce_all  # noqa: E402
+import study_page  # noqa: E402
 
 SEED = 0
 
@@ -61,3 +67,44 @@ def test_a_second_run_finds_every_step_done_and_makes_a_lost_one_anew(study):
     (out / "tables_1_2.json").unlink()
     assert reproduced(config).count("there already") == 7
     assert (out / "tables_1_2.json").is_file()
+
+
+def test_again_forgets_every_part_but_keeps_the_results(tmp_path):
+    parts = [tmp_path / reproduce_all.RECORD, tmp_path / "table3_swarms.jsonl", tmp_path / "table4_runs" / "a.npz",
+             tmp_path / "tracking_runs" / "b.npz"]  # fmt: skip
+    kept = tmp_path / "table3_swarms.json"
+    for path in (*parts, kept):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("{}")
+    reproduce_all.forget(tmp_path)
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [kept]
+
+
+def test_errors_that_are_not_defined_are_called_so_and_nothing_is_claimed_of_them(study, tmp_path):
+    out, config, _ = study
+    shutil.copytree(out, tmp_path / "study")
+    folder = tmp_path / "study"
+    runs, path = pd.read_parquet(folder / "table3_runs.parquet"), folder / "table3_swarms.json"
+    runs.assign(com=math.nan).to_parquet(folder / "table3_runs.parquet")
+    folder.joinpath("table3_swarms.json").write_text(json.dumps(without_centres(json.loads(path.read_text()))))
+    config = dataclasses.replace(config, out=folder, figures=folder / "figures")
+    page = study_page.write(config, config.arm()).read_text()
+    assert not re.search(r"\bnan\b", page)
+    assert page.count("not defined") > 5
+    assert "| all centres of mass of this arm are zero |  | **cannot be judged** |" in page
+
+
+def without_centres(stored: Any) -> Any:
+    """A result as it is stored for an arm whose centres of mass are all zero."""
+    if isinstance(stored, list):
+        return [without_centres(part) for part in stored]
+    if not isinstance(stored, dict):
+        return stored
+    undefined = {key: None for key in ("com", "com_sd", "averaged_com") if isinstance(stored.get(key), float)}
+    told: dict[str, Any] = {key: without_centres(value) for key, value in stored.items()} | undefined
+    if "over_pairs" in told:
+        told["over_pairs"]["com"] = {"lower": 0.0, "higher": 0.0, "pairs": 0}
+    if told.get("column") == "com":
+        told |= {"p": 1.0, "p_holm": 1.0, "medians": [math.nan, math.nan], "lower": "neither", "effect": 0.0}
+        told |= {"effect_interval": [0.0, 0.0], "difference": None, "difference_interval": None}
+    return told

@@ -55,9 +55,19 @@ def test_an_interrupted_sweep_adds_what_is_missing_and_ends_at_the_same_rows(tmp
     readings = config.readings(arm)
     rows = table3_swarms.run(config, arm, readings)
     path = tmp_path / "table3_swarms.jsonl"
-    path.write_text("".join(path.read_text().splitlines(keepends=True)[:2]))
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:2]) + lines[2][:40])  # the third was being written
     assert table3_swarms.run(config, arm, readings) == rows
     assert len(path.read_text().splitlines()) == len(rows)
+
+
+def test_rows_of_swarms_of_another_size_are_not_taken_for_these(tmp_path):
+    config = table3_swarms.Config(smoke=True, out=tmp_path)
+    reading = config.readings(config.arm())[:1]
+    row = table3_swarms.run(config, config.arm(), reading)[0]
+    path = tmp_path / "table3_swarms.jsonl"
+    assert table3_swarms._stored(path, len(row["com"])) == [row]
+    assert table3_swarms._stored(path, table3_swarms.FULL["seeds"]) == []
 
 
 def test_one_linear_solve_beats_every_swarm():
@@ -67,6 +77,6 @@ def test_one_linear_solve_beats_every_swarm():
 
 def test_what_is_zero_in_the_reference_is_not_sought():
     arm = table3_swarms.Config(joints=6).arm()
-    left = {name for name, sought in zip(arm.names, arm.searched, strict=True) if not sought}
+    left = {name for name, sought in zip(arm.unknowns.names, arm.unknowns.sought, strict=True) if not sought}
     assert left == {"cy6", "Ixy6", "Iyz6"}  # as in the robot's file
     assert study_readings.objective(study_readings.Reading("pso"), arm).reference.shape == (6 * 9 - 3,)

@@ -14,7 +14,7 @@ from irb140_jax import dynamics, kinematics
 from irb140_jax.errors import RobotError
 from irb140_jax.oracle import mujoco as oracle
 from irb140_jax.oracle.mjcf import mjcf
-from irb140_jax.robot import Robot, first_joints, load_robot, robot_from_model
+from irb140_jax.robot import Robot, first_joints, load_robot, robot_from_model, subset
 from irb140_jax.robot.tree import carried, is_depth_first, moves, path
 
 # Two arms on a torso; branches that part at the base.
@@ -200,6 +200,17 @@ def test_first_joints_of_a_tree_carry_the_rest_as_mujoco_says(case):
     q[count:], qd[count:], qdd[count:] = model.qpos0[count:], 0.0, 0.0
     ours = dynamics.inverse_dynamics(cut, *(jnp.asarray(x[:count]) for x in (q, qd, qdd)))
     close(ours, oracle.inverse_dynamics(model, q, qd, qdd)[:count])
+
+
+def test_any_choice_of_a_trees_joints_moves_as_mujoco_says_with_the_others_held(case):
+    robot, model = case
+    keep = np.arange(1, robot.n, 2)
+    q, qd, qdd = random_state(robot.n, 4)
+    still = np.delete(np.arange(robot.n), keep)
+    qd[still], qdd[still] = 0.0, 0.0
+    cut = subset(robot, keep.tolist(), jnp.asarray(q))
+    ours = dynamics.inverse_dynamics(cut, *(jnp.asarray(x[keep]) for x in (q, qd, qdd)))
+    close(ours, oracle.inverse_dynamics(model, q, qd, qdd)[keep])
 
 
 def test_denavit_hartenberg_table_is_of_a_chain_only(case):

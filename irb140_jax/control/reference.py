@@ -1,6 +1,4 @@
-"""Motions to follow: a circle of the tool, by inverse kinematics."""
-
-from collections.abc import Sequence
+"""A path of the tool as a motion of the joints, by inverse kinematics."""
 
 import equinox as eqx
 import jax
@@ -17,8 +15,12 @@ from irb140_jax.types import Joints, JointSamples, Pose, Samples
 NODES = 300
 # Newton steps from there: the error is squared each time, from some 1e-5.
 POLISH = 4
+# Newton steps of a node with more joints than the tool needs, until all of them are where they belong.
+SETTLE = 10
 # Error of the tool along the path that is taken for round-off [m, rad].
 REACHED = 1e-9
+# Share of the largest singular value below which the tool can't move in a direction at all.
+RANK = 1e-6
 
 Points = Float[Array, "S 3"]
 
@@ -39,87 +41,16 @@ class Reference(eqx.Module):
     qdd: JointSamples
 
 
-def circle(
-    robot: Robot,
-    *,
-    duration: float = 30.0,
-    dt: float = 0.001,
-    radius: float = 0.1,
-    normal: Sequence[float] = (0.0, 0.0, 1.0),
-    centre: Sequence[float] | None = None,
-    laps: float = 1.0,
-    ramp: float = 2.0,
-    posture: Joints | None = None,
-) -> Reference:
-    """The tool on a circle, from rest to rest; with six joints its orientation is kept.
-
-    The study says no more than that the circle takes 30 s.  Our defaults: one lap, level, of 0.1 m radius, passing
-    through where the tool is in the starting posture, at the end of the circle that is furthest out along x.
-
-    Args:
-        robot: Arm with 3 joints, whose position follows, or with 6.
-        duration: Time for all laps [s].
-        dt: Spacing of the samples [s]; integrators that span two of them per step need half their step.
-        radius: Radius [m].
-        normal: Direction of the circle's axis in the world, any length, shape (3,).
-        centre: Centre in the world [m], shape (3,); default such that the circle starts where the tool is.
-        laps: Number of turns; negative ones run clockwise about the normal.
-        ramp: Time to come to full speed, and likewise to rest [s]; at most half of the duration.
-        posture: Joint positions to start searching from and, with six joints, whose orientation is kept [rad], shape
-            (n,); default `robot.reference`.
-
-    Returns:
-        The motion, duration / dt + 1 samples.
-
-    Raises:
-        InputError: Another number of joints, impossible times, or a circle that the arm does not reach.
-    """
-    if not 0.0 < ramp <= 0.5 * duration or not 0.0 < dt < duration:
-        raise InputError(f"circle: duration {duration} s, ramp {ramp} s, dt {dt} s; 2 ramp <= duration, all above 0")
-    posture = robot.reference if posture is None else jnp.asarray(posture, float)
-    axis, out = _plane(normal)
-    tool = forward_kinematics(robot, posture)[:3, 3]
-    middle = tool - radius * out if centre is None else jnp.asarray(centre, float)
-    t = dt * jnp.arange(round(duration / dt) + 1)
-    angle, rate, change = (2.0 * jnp.pi * laps * x[:, None] for x in smooth_progress(t, duration, ramp))
-    across = jnp.cross(axis, out)
-    radial = jnp.cos(angle) * out + jnp.sin(angle) * across
-    tangent = jnp.cos(angle) * across - jnp.sin(angle) * out
-    points = middle + radius * radial
-    return along(robot, t, points, radius * rate * tangent, radius * (change * tangent - rate**2 * radial), posture)
-
-
-def smooth_progress(t: Samples, duration: float, ramp: float) -> tuple[Samples, Samples, Samples]:
-    """From 0 to 1 with a speed that rises and falls by the quintic 10 x^3 - 15 x^4 + 6 x^5: jerk has no jumps.
-
-    Args:
-        t: Time [s], shape (S,), within [0, duration].
-        duration: Time of the whole [s].
-        ramp: Time in which the speed rises, and falls again [s].
-
-    Returns:
-        Progress [1], its rate [1/s] and the rate's change [1/s^2], shape (S,) each.
-    """
-    top = 1.0 / (duration - ramp)
-
-    def rise(time):
-        x = jnp.clip(time / ramp, 0.0, 1.0)
-        covered = ramp * x**4 * (2.5 - 3.0 * x + x**2) + jnp.maximum(time - ramp, 0.0)
-        return covered, x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * x**2 * (1.0 - x) ** 2 / ramp
-
-    begun, ended = rise(t), rise(duration - t)
-    late = t > 0.5 * duration
-    progress = jnp.where(late, 1.0 - top * ended[0], top * begun[0])
-    return progress, top * jnp.where(late, ended[1], begun[1]), top * jnp.where(late, -ended[2], begun[2])
-
-
 def along(
     robot: Robot, t: Samples, points: Points, velocity: Points, acceleration: Points, posture: Joints
 ) -> Reference:
-    """The joints' motion that takes the tool along points; with six joints its orientation is that of the posture.
+    """The joints' motion that takes the tool along points; with six joints or more its orientation is kept.
+
+    Joints that the tool has no need of are held to the posture as far as they can be: what the tool's motion leaves
+    free at the posture, the null space N of its Jacobian there, stays, N (q - posture) = 0.
 
     Args:
-        robot: Arm with 3 or 6 joints.
+        robot: Arm with n joints.
         t: Time [s], shape (S,).
         points: Tool positions in the world [m], shape (S, 3).
         velocity: Their rates [m/s], shape (S, 3).
@@ -127,19 +58,18 @@ def along(
         posture: Joint positions to start searching from [rad or m], shape (n,).
 
     Raises:
-        InputError: Another number of joints, or points out of reach.
+        InputError: Points out of reach, or joints beyond their limits.
+
+    Source: Baillieul (1985), Kinematic programming alternatives for redundant manipulators, with constant rows.
     """
-    if robot.n not in (3, 6):
-        raise InputError(
-            f"a path of the tool asks for 3 joints (position) or 6 (orientation, too), but robot '{robot.name}' has "
-            f"{robot.n}: take robot.first_joints(robot, 3), or give the joints' own motion as a Reference"
-        )
-    q, qd, qdd, error = _followed(robot, points, velocity, acceleration, posture)
+    moves, rest = _directions(robot, posture)
+    q, qd, qdd, error = _followed(robot, points, velocity, acceleration, posture, moves, rest)
     worst = float(error.max())
     if not worst <= REACHED:
+        few = "with fewer than 3 joints, give the joints' own motion as a Reference" if robot.n < 3 else ""
         raise InputError(
             f"robot '{robot.name}' does not reach the path: {worst:.2g} m or rad are left at t = "
-            f"{float(t[int(error.argmax())]):.3g} s; move or shrink it, or start from another posture"
+            f"{float(t[int(error.argmax())]):.3g} s; {few or 'move or shrink it, or start from another posture'}"
         )
     if bool(jnp.any((q < robot.lower) | (q > robot.upper))):
         joint = robot.joint_names[int(jnp.argmax(jnp.any((q < robot.lower) | (q > robot.upper), axis=0)))]
@@ -147,49 +77,61 @@ def along(
     return Reference(t, q, qd, qdd)
 
 
+def task_rows(robot: Robot) -> int:
+    """How much of the tool's pose follows: 3 (position), from six joints on 6 (orientation, too)."""
+    return 6 if robot.n >= 6 else 3
+
+
+def _directions(robot: Robot, posture: Joints) -> tuple[Float[Array, "r m"], Float[Array, "k n"]]:
+    """Rows onto the directions in which the tool can move at the posture, and onto what it ignores of the joints."""
+    rows = task_rows(robot)
+    U, values, V = np.linalg.svd(np.asarray(jacobian(robot, posture))[:rows])
+    rank = int(np.sum(values > RANK * values[0]))
+    moves = np.eye(rows) if rank == rows else U[:, :rank].T
+    return jnp.asarray(moves), jnp.asarray(V[rank:])
+
+
 @jax.jit
-def _followed(robot: Robot, points: Points, velocity: Points, acceleration: Points, posture: Joints):
-    whole = robot.n == 6
+def _followed(
+    robot: Robot, points: Points, velocity: Points, acceleration: Points, posture: Joints,
+    moves: Float[Array, "r m"], rest: Float[Array, "k n"],
+):  # fmt: skip
+    rows = task_rows(robot)
+    whole, free = rows == 6, robot.n - moves.shape[0]
     T_start = forward_kinematics(robot, posture)
 
     def pose_at(point) -> Pose:
         return T_start.at[:3, 3].set(point)
 
-    def joint_rates(q, v):
-        J = jacobian(robot, q)[: 6 if whole else 3]
-        return jnp.linalg.solve(J, jnp.concatenate([v, jnp.zeros(3)]) if whole else v)
+    def task(v):
+        """A velocity of the tool, or its rate, as what the square system asks for."""
+        return jnp.concatenate([moves @ (jnp.concatenate([v, jnp.zeros(3)]) if whole else v), jnp.zeros(free)])
+
+    def system(q):
+        return jnp.concatenate([moves @ jacobian(robot, q)[:rows], rest])
+
+    def missing(q, point):
+        return jnp.concatenate([moves @ pose_error(robot, pose_at(point), q, whole), rest @ (posture - q)])
+
+    def newton(q, point, steps: int):
+        return jax.lax.fori_loop(0, steps, lambda _, q: q + jnp.linalg.solve(system(q), missing(q, point)), q)
 
     def node(q, point):
         q = damped_least_squares(robot, pose_at(point), q, orientation=whole).q
+        q = newton(q, point, SETTLE) if free else q
         return q, q
 
     def polished(q, point, v, a):
-        for _ in range(POLISH):
-            J = jacobian(robot, q)[: 6 if whole else 3]
-            q = q + jnp.linalg.solve(J, pose_error(robot, pose_at(point), q, whole))
-        qd = joint_rates(q, v)
+        q = newton(q, point, POLISH)
+        qd = jnp.linalg.solve(system(q), task(v))
         # v = J qd, so a = J qdd + Jd qd.
-        drift = jax.jvp(lambda q: jacobian(robot, q), (q,), (qd,))[1] @ qd
-        J = jacobian(robot, q)[: 6 if whole else 3]
-        wanted = jnp.concatenate([a, jnp.zeros(3)]) if whole else a
-        qdd = jnp.linalg.solve(J, wanted - drift[: 6 if whole else 3])
-        return q, qd, qdd, jnp.linalg.norm(pose_error(robot, pose_at(point), q, whole))
+        drift = jax.jvp(system, (q,), (qd,))[1] @ qd
+        qdd = jnp.linalg.solve(system(q), task(a) - drift)
+        error = jnp.concatenate([pose_error(robot, pose_at(point), q, whole), rest @ (posture - q)])
+        return q, qd, qdd, jnp.linalg.norm(error)
 
     count = points.shape[0]
     chosen = np.unique(np.linspace(0, count - 1, min(NODES, count)).round().astype(int))
     _, nodes = jax.lax.scan(node, posture, points[chosen])
     guess = jax.vmap(lambda x: jnp.interp(jnp.arange(count), chosen, x), in_axes=1, out_axes=1)(nodes)
     return jax.vmap(polished)(guess, points, velocity, acceleration)
-
-
-def _plane(normal: Sequence[float]) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
-    """Unit vectors along the normal, and in the plane as near to x as may be (to z for a plane across x)."""
-    axis = np.asarray(normal, float)
-    size = np.linalg.norm(axis)
-    if axis.shape != (3,) or not size > 0.0:
-        raise InputError(f"circle: normal {normal}; give three numbers that are not all zero")
-    axis = axis / size
-    out = np.eye(3)[0] - axis[0] * axis
-    if np.linalg.norm(out) < 1e-6:
-        out = np.eye(3)[2] - axis[2] * axis
-    return jnp.asarray(axis), jnp.asarray(out / np.linalg.norm(out))

@@ -17,8 +17,12 @@ from irb140_jax.identify.judge import Comparison as Comparison
 from irb140_jax.identify.judge import compared as compared
 from irb140_jax.identify.judge import mape as mape
 from irb140_jax.identify.judge import plateau as plateau
+from irb140_jax.identify.judge import sought as sought
 from irb140_jax.identify.linear_fit import LinearFit as LinearFit
 from irb140_jax.identify.linear_fit import linear_fit as linear_fit
 from irb140_jax.identify.parameters import link_parameters as link_parameters
 from irb140_jax.identify.parameters import phi_of as phi_of
 from irb140_jax.identify.parameters import with_link_parameters as with_link_parameters
+from irb140_jax.identify.unknowns import Unknowns as Unknowns
+from irb140_jax.identify.unknowns import parameter_names as parameter_names
+from irb140_jax.identify.unknowns import unknowns as unknowns

@@ -71,25 +71,26 @@ class ParameterDistance(eqx.Module):
 
 def parameter_distance(
     reference: Float[Array, " d"], lower: Float[Array, " d"], upper: Float[Array, " d"], *, units: Units = "normalised",
-    penalty: Penalty | None = None,
+    penalty: Penalty | None = None, centres: int | None = None,
 ) -> ParameterDistance:  # fmt: skip
     """Equation 20 with a reading of its units.
 
     Args:
-        reference: x_ref, see `link_parameters`.
+        reference: x_ref, see `link_parameters`, or some of them in that order; of a robot's, `Unknowns.distance`.
         lower, upper: The box, shape (d,).
         units: "normalised": each entry divided by its reference; "si": m and kg m^2; "mm": mm and kg m^2; "mm_all":
             mm and kg mm^2.
         penalty: Of leaving the box.
+        centres: How many entries, the first, are centres of mass; default a third.
 
     Raises:
         InputError: An entry of the reference is zero where it would have to divide.
     """
-    centres = reference.shape[0] // 3
-    is_com = jnp.arange(reference.shape[0]) < centres
+    is_com = jnp.arange(reference.shape[0]) < (reference.shape[0] // 3 if centres is None else centres)
     if units == "normalised":
         if not bool(jnp.all(reference != 0)):
-            raise InputError("units 'normalised' divide by the reference, which has a zero; give 'si' or 'mm'")
+            raise InputError("units 'normalised' divide by the reference, which has a zero; give 'si' or 'mm', or "
+                             "leave it out: identify.unknowns(robot, links).distance(...)")
         unit = 1.0 / jnp.abs(reference)
     else:
         com, inertia = {"si": (1.0, 1.0), "mm": (1e3, 1.0), "mm_all": (1e3, 1e6)}[units]

@@ -5,6 +5,24 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
+# Share of a link's largest value below which an entry is zero: round-off of a file reader's principal axes.
+ROUND_OFF = 1e-9
+
+
+def sought(reference: np.ndarray) -> np.ndarray:
+    """Which parameters can be sought: a percentage of zero, or a box as wide as a share of it, is not defined.
+
+    Args:
+        reference: See `link_parameters`, shape (d,).
+
+    Returns:
+        True where an entry is not zero beside the largest of its link's, centres and inertias apart; bool, shape (d,).
+    """
+    x = np.abs(np.asarray(reference))
+    k = len(x) // 9
+    by_link = (x[: 3 * k].reshape(k, 3), x[3 * k :].reshape(k, 6))
+    return np.concatenate([(v > ROUND_OFF * v.max(axis=1, keepdims=True)).ravel() for v in by_link])
+
 
 def mape(
     x: np.ndarray, reference: np.ndarray, counted: np.ndarray | None = None
@@ -14,18 +32,24 @@ def mape(
     Args:
         x: Estimates, shape (s, d), see `link_parameters`.
         reference: Shape (d,).
-        counted: Which entries count, shape (d,); default all.  One that is zero in the reference has no percentage.
+        counted: Which entries count, shape (d,); default those that are not zero, see `sought`.
 
     Returns:
-        Of the centres of mass and of the inertias [%], shape (s,) each.
+        Of the centres of mass and of the inertias [%], shape (s,) each; NaN where none of them counts, as the error is
+        not defined then.
 
     Source: the study's equation 30.
     """
     reference = np.asarray(reference)
-    chosen = np.ones(reference.shape, bool) if counted is None else np.asarray(counted)
+    chosen = sought(reference) if counted is None else np.asarray(counted)
     error = 100.0 * np.abs(np.asarray(x)[..., chosen] / reference[chosen] - 1.0)
     centres = int(np.count_nonzero(chosen[: len(reference) // 3]))
-    return error[..., :centres].mean(axis=-1), error[..., centres:].mean(axis=-1)
+    return _mean(error[..., :centres]), _mean(error[..., centres:])
+
+
+def _mean(error: np.ndarray) -> np.ndarray:
+    """Over the last axis; NaN, without a warning, where it is empty."""
+    return error.mean(axis=-1) if error.shape[-1] else np.full(error.shape[:-1], np.nan)
 
 
 def plateau(best: np.ndarray, remaining: float = 0.01) -> int:

@@ -9,4 +9,5 @@ from irb140_jax.robot.robot import with_phi as with_phi
 from irb140_jax.robot.shipped import irb140 as irb140
 from irb140_jax.robot.shipped import irb140_path as irb140_path
 from irb140_jax.robot.subchain import first_joints as first_joints
+from irb140_jax.robot.subchain import subset as subset
 from irb140_jax.robot.write import robot_mjcf as robot_mjcf
