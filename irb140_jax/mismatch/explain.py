@@ -119,7 +119,7 @@ def _without_discrepancy(ex: Explanation) -> Explanation:
 
 
 def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
-    """Finer grids of shapes around the best ones, and grids that the residual suggests; the set with the best shapes."""
+    """Finer grids of shapes around the best ones, grids that the residual suggests, the set with the best shapes."""
     left = left_over(ex.data, ex.columns(), ex.noise.total)
     shapes, best = [], {i: ex.data.candidates[i].shape for i in ex.chosen}
     for effect, sites, old, _ in ex.lib.blocks:

@@ -110,7 +110,7 @@ class Explanation:
         return GAIN_COMMON * float(mean[at]), GAIN_COMMON * float(np.sqrt(cov[at, at]))
 
     def prediction(self, without: np.ndarray | None = None) -> tuple[Posterior, float, list[np.ndarray]]:
-        """What predicts: inertials of possible bodies and amplitudes, the torque scale less one, each joint's own columns.
+        """What predicts: possible inertials and amplitudes, the torque scale less one, and each joint's own columns.
 
         Args:
             without: Which blocks of the data are left out, shape (blocks,).

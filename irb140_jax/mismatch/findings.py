@@ -84,7 +84,7 @@ def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
 
 
 def _log_odds(ex: Explanation, index: int) -> float:
-    """Log posterior odds of a finding against what is left without it; a law of friction also against the usual ones."""
+    """Log posterior odds of a finding against the set without it; of friction also against ordinary friction."""
     c, rest = ex.data.candidates[index], ex.others(index)
     options = [rest]
     if c.effect.friction and not c.effect.ordinary:

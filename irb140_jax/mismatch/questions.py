@@ -64,7 +64,8 @@ class Questions:
 
         The log that either predicts is added to the recordings there are; the other does with it what it can, with
         inertials, amplitudes and shapes free: half the divergence that T-optimal designs maximise.  What laws
-        are usually wrong by (`USUAL`) is taken off, so that the motion convinces without it; below zero, they stay even.
+        are usually wrong by (`USUAL`) is taken off, so that the motion convinces all the same; below zero, they stay
+        even.
 
         Args:
             added: What the motion adds, from `gram`.

@@ -65,7 +65,7 @@ class Integrated:
         return square - self.half[:, rows].T @ self.half[:, columns]
 
     def blocks(self, groups: np.ndarray) -> np.ndarray:
-        """Such Gram matrices of many small groups of columns (m, k), shape (m, k, k); -1 stands for a column of zeros."""
+        """Such Gram matrices of small groups of columns (m, k), shape (m, k, k); -1 stands for a column of zeros."""
         at, there = groups + len(self.gram) - self.half.shape[1], groups >= 0
         G = self.gram[at[:, :, None], at[:, None, :]] / self.level**2
         part = np.moveaxis(self.half[:, groups], 0, 1)

@@ -168,7 +168,7 @@ class Search:
 
     def _on_all_joints(self, now: frozenset[int]) -> frozenset[int]:
         """Another kind on every joint at once, or one effect of all joints, in the place of all of a kind."""
-        space, tries = self.space, []
+        tries = []
         kinds = [self._of(m).slug for m in now if len(self._of(m).joints) == 1 and not self._of(m).effect.ordinary]
         for slug in dict.fromkeys(k for k in kinds if kinds.count(k) > 1):
             rest = frozenset(m for m in now if self._of(m).slug != slug)

@@ -67,7 +67,9 @@ def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:
     return noise_from_residuals(residuals, [s.use for s in data.stretches], dof, [s.unsure for s in data.stretches])
 
 
-def noise_left(data: Data, extra: Sequence[Nuisances], space: Space, chosen: Sequence[int], settings: Settings) -> Noise:
+def noise_left(
+    data: Data, extra: Sequence[Nuisances], space: Space, chosen: Sequence[int], settings: Settings
+) -> Noise:
     """Noise that a set leaves, with errors of the instrument and the discrepancy beside it.
 
     Args:
