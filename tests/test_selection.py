@@ -72,7 +72,7 @@ def density(space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, 
 @pytest.mark.parametrize("chosen", [(), (0,), (1, 6), (0, 3, 5)])
 def test_the_evidence_of_a_set_is_the_density_of_the_data(chosen):
     space, data = planted(1, {0: 1.0, 5: 0.5})
-    settings = (SETTING, (0, 2, 6, ONE))
+    settings = (SETTING, (0, 2, 5, ONE))
     expected = density(space, data, chosen, settings) + sum(map(log_prior, settings)) + len(chosen) * np.log(0.05)
     assert space.log_evidence(chosen, settings) == pytest.approx(expected, abs=1e-8)
 

@@ -205,8 +205,7 @@ def _finite(recording: Recording) -> Recording:
 def _model(
     robot: Robot, ex: Explanation, refit: Refit, proof: HeldOut, band: Band, known: tuple[str, ...]
 ) -> CorrectedModel:
-    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
-    refitted_shift, _, _ = fitted(ex.data, refit.posterior(), loose, ex.factor)
+    refitted_shift, _, _ = fitted(ex.data, refit.posterior(), refit.loose, ex.factor)
     post, scale, own = ex.prediction()
     dphi, members, amplitudes = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)

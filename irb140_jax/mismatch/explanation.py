@@ -117,25 +117,31 @@ class Explanation:
         """
         space = self.space if without is None else self.space.without(without)
         mean, cov = space.posterior(self.chosen, self.settings, instrument=False, scaled=self.scaled)
-        mean = of_bodies(mean, cov, self._into_inertials(len(mean)), np.asarray(self.lib.robot.phi), self.factor)
+        mean = self.of_bodies(mean, cov, self.chosen, space.offset)
         columns = space.set_columns(self.chosen)
         own = [space.own(j, s, columns, mean, instrument=False) for j, s in enumerate(self.settings)]
         keep = np.r_[0 : space.inertials, space.offset : len(mean)]
         post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
         return post, GAIN_COMMON * float(mean[space.inertials]), own
 
-    def _into_inertials(self, width: int) -> np.ndarray:
-        """From the shared columns of the chosen set to relative errors of the inertials, shape (10 n, width)."""
-        size, first = self.space.inertials, self.space.offset
-        into = np.zeros((size, width))
+    def of_bodies(self, mean: np.ndarray, cov: np.ndarray, chosen: tuple[int, ...], first: int) -> np.ndarray:
+        """The most probable mean of inertials, whatever is between, and a set's amplitudes, that bodies can have.
+
+        Args:
+            mean, cov: In prior units.
+            chosen: The set.
+            first: Column of its first amplitude.
+        """
+        size = self.space.inertials
+        into = np.zeros((size, len(mean)))
         into[:, :size] = np.diag(self.data.scale[:size])
-        for c in self.members:
+        for c in (self.data.candidates[i] for i in chosen):
             own = first + np.arange(len(c.columns))
             if c.slug == "inertials":
                 rows = (10 * np.array(c.joints)[:, None] + np.arange(10)).ravel()
                 into[rows, own] = self.data.scale[self.data.nuisances + c.columns]
             first += len(own)
-        return into
+        return of_bodies(mean, cov, into, np.asarray(self.lib.robot.phi), self.factor)
 
     def probability(self, index: int) -> float:
         """Of a chosen candidate's effect at its joints, over all sets visited."""

@@ -86,26 +86,34 @@ class Refit:
     """The rigid body with refitted inertials and nothing else.
 
     Attributes:
-        grams: Gram matrices of its columns alone, under the noise that it leaves.
-        columns: Which of all columns those are.
+        ex: The explanation that it stands beside.
+        loose: Its candidates that stand for inertials wrong beyond their stated uncertainty: free here too.
+        grams: Gram matrices of their columns and the inertials' alone, under the noise that those leave.
     """
 
+    ex: Explanation
+    loose: tuple[int, ...]
     grams: Grams
-    columns: np.ndarray
+
+    @property
+    def columns(self) -> np.ndarray:
+        """Which of all columns those are."""
+        return self.ex.columns(self.loose)
 
     def posterior(self, without: np.ndarray | None = None) -> Posterior:
-        """Inertials from all blocks, or from all but some."""
+        """Inertials of possible bodies from all blocks, or from all but some."""
         post = posterior(self.grams.total(without), np.arange(len(self.columns)))
-        return dataclasses.replace(post, columns=self.columns)
+        mean = self.ex.of_bodies(post.mean, post.cov, self.loose, self.ex.data.nuisances)
+        return Posterior(self.columns, mean, post.cov)
 
 
 def refitted(ex: Explanation) -> Refit:
-    """Refit the inertials; links that the explanation found wrong beyond their stated uncertainty are free here too."""
-    columns = ex.columns(tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials"))
+    """Refit the inertials beside an explanation."""
+    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
+    columns = ex.columns(loose)
     stretches = [s.of_rigid_body(columns) for s in ex.data.stretches]
     scale = ex.data.scale[columns]
-    noise = _noise_left(stretches, scale, ex.noise)
-    return Refit(grams(stretches, noise, scale, len(columns), BLOCKS), columns)
+    return Refit(ex, loose, grams(stretches, _noise_left(stretches, scale, ex.noise), scale, len(columns), BLOCKS))
 
 
 def _noise_left(stretches: list[Stretch], scale: np.ndarray, noise: Noise) -> Noise:
