@@ -12,7 +12,7 @@ from irb140_jax.oracle.mujoco import inverse_dynamics, oracle_model
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
 
-MOST = 4000  # samples of a recording along which the file is compared: 20 s at the working rate
+MOST = 1000  # samples of a recording along which the file is compared: 5 s at the working rate
 XML, NOTES = "corrected.xml", "corrected.md"
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.regression.gram import SIZES
 from irb140_jax.mismatch.selection.evidence import Settings, Space
 
 BEST = 3  # candidates of different kinds that a screening passes on to be judged in full
@@ -27,6 +28,9 @@ class Search:
         self._sites = [[i for i, c in enumerate(space.candidates) if j in c.joints and not whole[i]]
                        for j in range(len(space.joints))]  # fmt: skip
         self._sites.append([i for i, w in enumerate(whole) if w])
+        # What sizes of the discrepancy fitted anew may gain: the range of its features' prior volume.
+        features = max(int(np.sum(g.groups >= 0)) for g in space.joints)
+        self._refitting = features * np.log(SIZES[-1] / SIZES[1])
         self.visited: dict[frozenset[int], tuple[float, Settings]] = {}
         self._screened: dict[tuple[int, frozenset[int]], list[tuple[float, int]]] = {}
         self._in_vain: set[tuple[tuple[int, ...], frozenset[int]]] = set()
@@ -71,13 +75,17 @@ class Search:
                 best = other
         return best
 
-    def screened(self, chosen: frozenset[int], joint: int, most: int = BEST) -> list[int]:
+    def screened(self, chosen: frozenset[int], joint: int, most: int = BEST, least: float = -np.inf) -> list[int]:
         """The most promising candidates at a joint beside a set, the best of each kind and site.
 
-        The number after the last joint's stands for effects of the whole arm.
+        Args:
+            chosen: The set.
+            joint: Its number; the one after the last joint's stands for effects of the whole arm.
+            most: How many.
+            least: Log posterior that they must be able to reach with sizes fitted anew.
         """
-        bad = self.space.conflicts(tuple(chosen))
-        return [i for _, i in self._scored(chosen, joint) if not bad[i] and i not in chosen][:most]
+        bad, within = self.space.conflicts(tuple(chosen)), least - self._refitting
+        return [i for v, i in self._scored(chosen, joint) if v > within and not bad[i] and i not in chosen][:most]
 
     def _scored(self, chosen: frozenset[int], joint: int) -> list[tuple[float, int]]:
         """Log posterior of a set with each kind of candidate at a joint, best first, and the candidate.
@@ -120,7 +128,7 @@ class Search:
         return {j for m in members for j in self.space.candidates[m].joints}
 
     def _added(self, now: frozenset[int]) -> frozenset[int]:
-        tries = {i for j in range(len(self._sites)) for i in self.screened(now, j, 2)}
+        tries = {i for j in range(len(self._sites)) for i in self.screened(now, j, 2, self._value(now))}
         return self._best(now, ((now | {i}, self._joints(i)) for i in tries))
 
     def _removed(self, now: frozenset[int]) -> frozenset[int]:
@@ -140,12 +148,15 @@ class Search:
             special = [i for i in self._special(drop) if not bad[i]]
             others += [(rest | {i}, joints) for i in special]
             others += [(rest | set(p), joints) for p in itertools.combinations(special, 2) if self._together(*p)]
-            for j in (*sorted(joints), len(space.joints)):
-                for i in self.screened(rest, j):
+            # What acts on the whole arm takes the place of its like here; of a law on each joint in `_on_all_joints`.
+            whole = [len(space.joints)] if len(joints) == len(space.joints) else []
+            for j in (*sorted(joints), *whole):
+                for i in self.screened(rest, j, least=self._value(now)):
                     one = rest | {i}
                     others.append((one, joints | self._joints(i)))
                     self.judged(one, self.visited[rest][1], joints | self._joints(i))
-                    others += [(one | {k}, joints | self._joints(i, k)) for k in self.screened(one, j, 1)]
+                    more = self.screened(one, j, 1, self._value(now))
+                    others += [(one | {k}, joints | self._joints(i, k)) for k in more]
             if (better := self._best(now, others)) != now:
                 return better
             self._in_vain.add(beside)
