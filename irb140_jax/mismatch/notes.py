@@ -4,10 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from irb140_jax.mismatch.explanation import Explanation
+from irb140_jax.mismatch.prove import HeldOut
+from irb140_jax.mismatch.regression.nuisances import SCALED
+from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
+SLOPE = SCALED.index("slope")
 NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
 
 
@@ -57,6 +62,42 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
         f"{'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of its torque): {reason}. Use `irb140 predict` instead."
         for name, slide, g, t in zip(robot.joint_names, robot.is_slide, gap, torque, strict=True)
         if g > NOTABLE_GAP * t > 0.0
+    ]
+
+
+def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
+    """A note for every joint whose dry friction differs from recording to recording.
+
+    Said where a level of friction of its own for each recording is more probable than one for all, against the odds of
+    any rare effect.
+
+    Args:
+        ex: The explanation.
+        names: Of the recordings.
+    """
+    out = []
+    _, _, own = ex.prediction()
+    for j, setting in enumerate(ex.settings):
+        alike = (*ex.settings[:j], (*setting[:SLOPE], 0, *setting[SLOPE + 1 :]), *ex.settings[j + 1 :])
+        gain = ex.space.log_evidence(ex.chosen, ex.settings) - ex.space.log_evidence(ex.chosen, alike)
+        slopes = ex.extra[0].groups[j] == SLOPE
+        if slopes.any() and gain > -np.log(RARE):
+            unit = "N" if ex.lib.robot.is_slide[j] else "N m"
+            each = (own[j] * ex.extra[0].units[j])[slopes]
+            said = ", ".join(f"{x:+.3g} {unit} in {name}" for x, name in zip(each, names, strict=True))
+            out.append(f"Friction of {ex.lib.robot.joint_names[j]} differs between the recordings: {said}.")
+    return out
+
+
+def discrepancy_notes(robot: Robot, proof: HeldOut) -> list[str]:
+    """A note where the corrected model holds torque without a name."""
+    joints = [name for name, carried in zip(robot.joint_names, proof.carried, strict=True) if carried]
+    if not joints:
+        return []
+    return [
+        f"On {', '.join(joints)} the corrected model adds a function of the joint's own motion that no effect names, "
+        "because it makes the error of every unseen motion smaller. `irb140 predict` holds it; corrected.xml and "
+        "load_corrected do not."
     ]
 
 

@@ -78,8 +78,9 @@ def nuisances(
         for j in range(n):
             rotor = ROTOR * float(robot.armature[j]) * motion.qdd[:, j]
             fixed = np.stack([GAIN_JOINT * load[:, j], DELAY_JOINT * rate[:, j], rotor, bend[:, j]], axis=1)
-            slope = np.zeros((len(motion.t), count if count > 1 else 0))  # of one alone, it is the level itself
-            slope[:, r : r + 1] = motion.direction[:, [j]][:, : slope.shape[1]]
+            # Levels of dry friction about their mean, which is a law's; of one recording there is nothing beside it.
+            own = (np.arange(count) == r) - 1.0 / count
+            slope = motion.direction[:, [j]] * (own if count > 1 else np.zeros(0))
             features = [f(motion, load, scales, j) for f in (smooth_features, reversal_features)]
             joints.append([band.apply(b) for b in (fixed, *features, slope)])
         raw.append(joints)

@@ -141,7 +141,7 @@ class Space:
         """Log evidence and prior of a set; -inf where its amplitudes are inadmissible."""
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(settings, every, every)
-        if not self.admissible(chosen, H):
+        if self._impossible(chosen, H):
             return -np.inf
         return self.constant(settings) + self._prior(chosen) + float(_log_evidences(H[None])[0])
 
@@ -220,11 +220,12 @@ class Space:
             if len(alike := self._alike[c]) > 1:
                 rest = tuple(i for i in chosen if i != c)
                 near = frozenset(i for i in rest if self.at_joint[list(self.candidates[c].joints), i].any())
-                key = alike[0], near, tuple(settings[j] for j in self.candidates[c].joints)
+                key = c, near, tuple(settings[j] for j in self.candidates[c].joints)
                 if key not in self._summed:
-                    self._summed[key] = special.logsumexp(self.gains(rest, settings, np.array(alike)))
-                own = self.gains(rest, settings, np.array([c]))[0]
-                out += max(float(self._summed[key] - own), 0.0) if np.isfinite(own) else 0.0
+                    gains = self.gains(rest, settings, np.array(alike))
+                    own = gains[alike.index(c)]
+                    self._summed[key] = float(special.logsumexp(gains) - own) if np.isfinite(own) else 0.0
+                out += self._summed[key]
         return out
 
     @cached_property
@@ -266,18 +267,19 @@ class Space:
                 return (*settings[:j], now, *settings[j + 1 :])
             now = best
 
-    def admissible(self, chosen: Sequence[int], H: np.ndarray) -> bool:
-        """Whether the amplitudes of a set, from the Gram matrix of its columns and y, are such as can be."""
+    def inadmissible(self, chosen: Sequence[int], settings: Settings) -> list[int]:
+        """Members of a set whose amplitudes are not such as can be."""
+        every = self.with_y(self.set_columns(chosen))
+        return self._impossible(chosen, self.gram(settings, every, every))
+
+    def _impossible(self, chosen: Sequence[int], H: np.ndarray) -> list[int]:
+        """The same, from the Gram matrix of a set's columns and y."""
         if not len(chosen):
-            return True
+            return []
         mean = linalg.cho_solve((root(with_prior(H[:-1, :-1])), True), H[:-1, -1])[self.offset :]
-        start = 0
-        for c in chosen:
-            k = len(self.columns[c])
-            part, start = mean[start : start + k], start + k
-            if self._outside(np.array([c]), part[None])[0]:
-                return False
-        return True
+        ends = np.cumsum([len(self.columns[c]) for c in chosen])
+        parts = [mean[e - len(self.columns[c]) : e] for c, e in zip(chosen, ends, strict=True)]
+        return [c for c, part in zip(chosen, parts, strict=True) if self._outside(np.array([c]), part[None])[0]]
 
     def _outside(self, which: np.ndarray, mean: np.ndarray) -> np.ndarray:
         """Which candidates' amplitudes (candidates, k) are inadmissible."""

@@ -71,9 +71,21 @@ class Search:
         """The best of some sets if it improves on a set, else that set."""
         settings, best = self.visited[now][1], now
         for other, joints in others:
-            if self.judged(other, settings, joints) > self._value(best) + (LEAST if best == now else 0.0):
+            other = self._possible(other, settings, joints)
+            if self._value(other) > self._value(best) + (LEAST if best == now else 0.0):
                 best = other
         return best
+
+    def _possible(
+        self, chosen: frozenset[int], settings: Settings, joints: Iterable[int] | None
+    ) -> frozenset[int]:
+        """A set, judged, or what is left of it without members whose amplitudes can't be: those would be zero."""
+        while not np.isfinite(self.judged(chosen, settings, joints)):
+            without = chosen - set(self.space.inadmissible(tuple(sorted(chosen)), self.visited[chosen][1]))
+            if without == chosen:
+                break
+            chosen = without
+        return chosen
 
     def screened(self, chosen: frozenset[int], joint: int, most: int = BEST, least: float = -np.inf) -> list[int]:
         """The most promising candidates at a joint beside a set, the best of each kind and site.
@@ -178,9 +190,14 @@ class Search:
         return [p for p in itertools.combinations(sorted(now), 2) if self._joints(p[0]) & self._joints(p[1])]
 
     def _on_all_joints(self, now: frozenset[int]) -> frozenset[int]:
-        """Another kind on every joint at once, or one effect of all joints, in the place of all of a kind."""
-        tries = []
+        """A kind on every joint at once; another, or one effect of all joints, in the place of all of a kind."""
+        space = self.space
+        tries: list[tuple[frozenset[int], None]] = []
         kinds = [self._of(m).slug for m in now if len(self._of(m).joints) == 1 and not self._of(m).effect.ordinary]
+        for slug in dict.fromkeys(kinds):
+            scored = [self._scored_anew(now, j) for j in range(len(space.joints))]
+            each = [next((i for _, i in at if self._of(i).slug == slug), None) for at in scored]
+            tries.append((now | {i for i in each if i is not None}, None))
         for slug in dict.fromkeys(k for k in kinds if kinds.count(k) > 1):
             rest = frozenset(m for m in now if self._of(m).slug != slug)
             without = self.judged(rest, self.visited[now][1])
