@@ -78,10 +78,16 @@ class Integrated:
         out[self.used] = self.scale[:, None] * linalg.solve_triangular(self.chol, self.half, lower=True, trans=1)
         return out
 
+    def spread(self) -> np.ndarray:
+        """Standard deviation of the own columns' coefficients beside shared ones that are known, shape (D,)."""
+        out = np.zeros(len(self.gram) - self.half.shape[1])
+        inverse = linalg.solve_triangular(self.chol, np.eye(len(self.used)), lower=True)
+        out[self.used] = self.scale * np.sqrt(np.sum(inverse**2, axis=0))
+        return out
+
     def dof(self) -> float:
         """How many of the own columns the rows determine."""
-        inverse = linalg.solve_triangular(self.chol, np.eye(len(self.used)), lower=True)
-        return float(len(self.used) - np.sum(inverse**2))
+        return float(len(self.used) - np.sum((self.spread()[self.used] / self.scale) ** 2))
 
 
 class JointGram:
