@@ -7,8 +7,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 # On top of every page whose stored results no later engine has made anew.
 FIRST_ENGINE = (
     "The figures of this page are stored results of the first statistical engine, which\n"
-    "[decisions 30 to 33](decisions/index.md) replaced: its cases are kept as regression tests, and the figures do not\n"
-    "say how good a diagnosis is today."
+    "[decisions 30 to 33](decisions/index.md) replaced: its cases are kept as regression tests, and the figures do\n"
+    "not say how good a diagnosis is today."
 )
 
 
