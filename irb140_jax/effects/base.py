@@ -45,7 +45,7 @@ class AbstractEffect(abc.ABC):
         variants: Subsets of the columns that make sense by themselves.
         confused_with: Slug of a look-alike -> the motion which separates the two.
         needs: The motion that would show the effect.
-        ordinary: Nearly every machine has it: rarer laws must beat it clearly.
+        ordinary: Nearly every machine has it: its prior probability at a joint is one half.
         friction: It rubs inside the transmission, so it is no part of the load that the transmission carries.
         dissipative: It can only take energy out of the arm, at every instant.
         mjcf: How MJCF expresses it, all of it or a part (see `in_model`), or None.
@@ -62,7 +62,7 @@ class AbstractEffect(abc.ABC):
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
         tied: Its amplitudes are of one order of size: what the data can't see of one, the others bound.
         vector: Its amplitudes are components of one vector: what the data can't see of it may be larger than the rest.
-        silent: It competes with what was left out, and is not that: no finding bears its name.
+        silent: A candidate of the search that is no left-out physics: it is never reported as a finding.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
         steps: Whether it can be simulated forward in time all the same (see `memory` and `step`).

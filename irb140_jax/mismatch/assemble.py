@@ -12,7 +12,7 @@ TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a shar
 LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
 FEWEST_ROWS = 40  # of a joint: any explanation fits fewer, and what is left of them is no measure of noise
 ROUNDING = 1e-9  # of a joint's torque: a column that moves less moves nothing
-BLOCKS = 5  # contiguous blocks per recording: for jackknife intervals, and folds where there is one recording
+BLOCKS = 5  # contiguous blocks per recording: folds where one recording alone tells of a joint or a finding
 
 
 @dataclasses.dataclass(frozen=True)

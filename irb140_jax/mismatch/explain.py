@@ -26,7 +26,7 @@ from irb140_jax.robot import Robot
 
 PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both ...
 MOST_PASSES = 5  # ... unless a shape is known far better than its grid is fine:
-COARSE = 100.0  # its best point stands alone by so much in log odds, and a law that is a little off leaves as much
+COARSE = 100.0  # nats by which its best point exceeds all others in some direction; a slightly wrong shape costs that
 
 
 def explain(
@@ -62,7 +62,7 @@ def explain(
     def explained(turn: int, blocks: int) -> Explanation:
         ex = explained_at(at, turn, blocks)
         if at and not at.rests_on <= {(m.slug, m.joints) for m in ex.members}:
-            # Under leaning gravity that nothing is named for, inertials can feign the tilt.
+            # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
             del ex
             return explained_at(None, turn, blocks)
         return ex
@@ -91,7 +91,7 @@ def explain(
         along, at = [seen_by(better, r) for r in along], point(robot, found[0], physics)
         loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
         noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
-        # A first grid is too coarse for any law to be right: the discrepancy would make all its points alike.
+        # A first grid is too coarse for any law to be right: with a discrepancy all its points are equally good.
         coarse = _coarse(ex)
         lib, chosen = _refined(ex if turn > 1 else _without_discrepancy(ex))
         turn += 1

@@ -78,7 +78,7 @@ class Explanation:
         return self.space.gains(chosen, self.settings, np.asarray(which, dtype=int))
 
     def near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
-        """Gram matrix of some amplitudes' columns and y, with all that is not known beside a set integrated out.
+        """Gram matrix of some amplitudes' columns and y; inertials, nuisances and a set's amplitudes integrated out.
 
         Args:
             chosen: The set.
@@ -125,10 +125,10 @@ class Explanation:
         return post, GAIN_COMMON * float(mean[space.inertials]), own
 
     def of_bodies(self, mean: np.ndarray, cov: np.ndarray, chosen: tuple[int, ...], first: int) -> np.ndarray:
-        """The most probable mean of inertials, whatever is between, and a set's amplitudes, that bodies can have.
+        """A posterior mean moved to the most probable inertials that bodies can have; all else moves along.
 
         Args:
-            mean, cov: In prior units.
+            mean, cov: Of inertials first and a set's amplitudes last, in prior units.
             chosen: The set.
             first: Column of its first amplitude.
         """

@@ -60,9 +60,7 @@ def torque_scale_odds(ex: Explanation) -> tuple[float, float]:
 
 
 def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
-    """The torque of all joints logged too large or too small by one factor, where that is probable.
-
-    """
+    """The torque of all joints logged too large or too small by one factor, where that is probable."""
     odds, probability = torque_scale_odds(ex)
     if not ex.scaled:
         return []

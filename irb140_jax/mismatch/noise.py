@@ -30,7 +30,7 @@ class Noise:
         ar: Coefficients of the whitening filter (leading 1), shape (n, ORDER + 1).
         level: Standard deviation of the innovations, shape (recordings, n) [N m or N].
         total: Standard deviation of the noise itself in the band, shape (recordings, n) [N m or N].
-        alike: Rows over which each joint's noise is alike, shape (n,); see `correlation_time`.
+        alike: Correlation time of each joint's residual [rows], shape (n,); see `correlation_time`.
     """
 
     ar: np.ndarray
@@ -58,7 +58,7 @@ class Noise:
 
 
 def spread(unsure: np.ndarray | float, total: np.ndarray | float) -> np.ndarray:
-    """How many times as loud as the noise a row is that is unsure by so much beside it."""
+    """Standard deviation of a row over that of the noise, where `unsure` [N m or N] comes on top of the noise."""
     return np.sqrt(1.0 + (np.asarray(unsure) / total) ** 2)
 
 
@@ -102,10 +102,10 @@ def noise_from_residuals(
 
 
 def correlation_time(series: Sequence[np.ndarray]) -> float:
-    """Rows over which signals of one kind are alike: the sum of their autocorrelation up to its first zero, twice.
+    """Correlation time of stationary signals [rows]: their autocorrelation summed over both sides to its first zero.
 
-    The spectrum at the lowest frequencies over its mean, that is: what is slow is that much less sure than white noise
-    of this size would make it.
+    It is the spectrum at the lowest frequencies over its mean.  The variance of a mean over many rows is larger by this
+    factor than it would be with white noise of the same size.
 
     Args:
         series: Shape (R,) each.

@@ -11,7 +11,7 @@ from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
 from irb140_jax.mismatch.rows import Stretch
 
-ALONE = 0.8  # share of a joint's usable rows, or of a finding's torque, beside which the others say nothing of it
+ALONE = 0.8  # share of a joint's usable rows, or of a finding's torque, without which nothing is known of it
 SETTLED = 2  # rounds in which the noise and what leaves it agree
 
 
@@ -185,7 +185,7 @@ def _unseen_error(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.nd
 
 
 def _only_here(ex: Explanation, chosen: tuple[int, ...], energy: np.ndarray, fold: np.ndarray) -> np.ndarray:
-    """Which columns of a set belong to what happens once, or but for a trace in this fold: no other tells of them."""
+    """Columns of members that only this fold can tell of: they happen once, or nearly all of their torque is in it."""
     members = [ex.data.candidates[i] for i in chosen]
     alone = energy[:, fold].sum(axis=1) > ALONE * energy.sum(axis=1)
     each = [np.full(len(c.columns), c.effect.once or a) for c, a in zip(members, alone, strict=True)]

@@ -1,7 +1,8 @@
 """Structure that no effect of the library explains: flexible competitors, scored on data that they did not see.
 
 Each competitor knows one group of variables: the joint's position and speed, its load, its past, another joint, time.
-If one of them predicts what the findings leave, something is left out, and its variables say where.
+If one of them predicts what the findings leave, something is left out, and its variables say where.  No finding is
+changed by it.
 """
 
 import dataclasses

@@ -1,8 +1,9 @@
 """Gram matrices of every joint, and what is left of them once its nuisance parameters are integrated out.
 
-With whitened rows y = Z z + E_j e + X w + noise of unit variance times the level, own nuisances e of joint j touch its
-rows only.  For given sizes of the discrepancy they are integrated out joint by joint, which leaves a small matrix over
-inertials, effects and y; sums of those over joints are all that a search needs.
+With whitened rows y = Z z + E_j e + X w + noise, z are inertials and common nuisance parameters, w the amplitudes of
+effects.  The own nuisance parameters e of joint j, its discrepancy among them, appear in the rows of that joint only.
+For given sizes of the discrepancy they are integrated out joint by joint.  That leaves a small matrix over inertials,
+effects and y; sums of those over joints are all that a search needs.
 """
 
 import dataclasses
@@ -220,7 +221,7 @@ def _joint_gram(
             out.append(part.T @ part)
             count.append(len(part))
             repeats.append(s.repeats)
-    # So many rows that are alike count as one.
+    # The likelihood is tempered by the correlation time of the residual.
     grams, rows = np.stack(out) / noise.alike[j], np.array(count) / noise.alike[j]
     return JointGram(index, grams, extra[0].groups[j], rows, np.array(repeats), float(misfit[j]))
 

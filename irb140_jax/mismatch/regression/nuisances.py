@@ -1,4 +1,4 @@
-"""Nuisance parameters: what every log may be wrong by, with stated prior widths, and the model discrepancy."""
+"""Columns of errors of the instrument, nuisance parameters with stated prior widths, and of the discrepancy."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ class Nuisances:
     """Columns of one recording beside inertials and effects, low-passed rows as in `Stretch`, in prior units.
 
     Attributes:
-        common: Torque scale and delay of all joints, shape (R, n, 2).
+        common: Torque scale, delay and smoothing of all joints, shape (R, n, 3).
         own: Of each joint, fixed widths first, then the blocks `SCALED`; shape (R, D_j) each.
         groups: Which block each own column belongs to: -1 fixed, else an index into `SCALED`; shape (D_j,) each.
         units: What each own column's feature was multiplied by, shape (D_j,) each.

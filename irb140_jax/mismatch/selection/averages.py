@@ -33,9 +33,9 @@ def probabilities(candidates: Sequence[Candidate], sets: Sets) -> dict[Site, flo
 def in_its_place(
     candidates: Sequence[Candidate], sets: Sets, best: Sequence[int], index: int
 ) -> tuple[dict[Site, float], float]:
-    """Share of the sets with each effect in the place of a member of the best one, and of those with it or any such.
+    """Probability of each effect in the place of a member of the best set, and of the member or any of those.
 
-    In its place stands what is not in the best set and shares a joint with the member, which itself is not there.
+    In its place, in a set without the member, is an effect that shares a joint with it and that the best set lacks.
     """
     mine, usual = site_of(candidates[index]), {site_of(candidates[i]) for i in best}
     filled, out = 0.0, defaultdict(float)

@@ -55,8 +55,8 @@ class Space:
     def conflicts(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Candidates that can't stand beside a set, shape (candidates,).
 
-        Beside what `Beside` says: one law a joint holds its level of dry friction, one puts its log out of time, and a
-        link's inertials are loose once.
+        Beside what `Beside` says: one law a joint holds its level of dry friction, one shifts its log in time, and one
+        candidate frees the inertials of a link.
         """
         out = self.beside.conflicts(chosen)
         for alike in (self._dry, self._late, self._loose):

@@ -34,13 +34,13 @@ def selected(space: Space, chosen: Sequence[int] = ()) -> tuple[tuple[int, ...],
 
 
 def named(space: Space, best: tuple[int, ...], settings: Settings, sets: Sets) -> tuple[tuple[int, ...], Settings]:
-    """Those of the best set that are probable, with what may stand in their place, and sizes and levels beside them."""
+    """Members of the best set that are probable together with what may stand in their place; sizes and levels then."""
     sure = tuple(i for i in best if in_its_place(space.candidates, sets, best, i)[1] >= NAMED)
     return sure, settings if sure == best else space.settled(sure, settings)[1]
 
 
 def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:
-    """Noise that is left where inertials, ordinary friction and the discrepancy may help: a start, by far no bound.
+    """Noise that inertials, ordinary friction and a discrepancy of any size leave: where the fit of levels starts.
 
     Args:
         data: Low-passed rows and candidates.

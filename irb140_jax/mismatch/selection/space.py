@@ -77,9 +77,9 @@ def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
 
 
 def _narrowed(grid: np.ndarray, first: np.ndarray) -> float:
-    """Log of the part of a first grid's extent that a later one covers: a shape known so well was as unlikely.
+    """Log of the share of the first grid's extent that a refined one covers: its prior volume.
 
-    By ratios for what is positive, by differences else.
+    Extents are ratios where a parameter is positive, and differences otherwise.
     """
     out = 0.0
     for new, old in zip(grid.T, first.T, strict=True):
