@@ -57,7 +57,7 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
     if gap is None:
         return ["corrected.xml could not be compared with the corrected model: MuJoCo has other joints."]
     reason = f"it lacks {', '.join(left_out)} in whole or in part" if left_out else (
-        "the fitted inertials are physically impossible, and the file holds the nearest possible ones")
+        "a link of the model has inertials that are physically impossible, and keeps them in the file")
     return [
         f"On {name} the torque of corrected.xml differs from that of the corrected model by {g:.3g} "
         f"{'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of its torque): {reason}. Use `irb140 predict` instead."
