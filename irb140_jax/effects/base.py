@@ -45,6 +45,7 @@ class AbstractEffect(abc.ABC):
         variants: Subsets of the columns that make sense by themselves.
         confused_with: Slug of a look-alike -> the motion which separates the two.
         needs: The motion that would show the effect.
+        typical: Prior standard deviation of its torque, as a share of the joint's torque.
         ordinary: Nearly every machine has it: its prior probability at a joint is one half.
         friction: It rubs inside the transmission, so it is no part of the load that the transmission carries.
         dissipative: It can only take energy out of the arm, at every instant.
@@ -78,6 +79,7 @@ class AbstractEffect(abc.ABC):
     variants: ClassVar[tuple[tuple[int, ...], ...]]
     confused_with: ClassVar[dict[str, str]] = {}
     needs: ClassVar[str]
+    typical: ClassVar[float] = 0.3
     ordinary: ClassVar[bool] = False
     friction: ClassVar[bool] = False
     dissipative: ClassVar[bool] = False

@@ -24,6 +24,7 @@ class TorqueGain(AbstractEffect):
         "load_dependent_friction": "the same loads at rest",
     }
     logged = 1
+    typical = 0.1  # what torque constants are known to
     needs = "large gravity torque on this joint and on others with the same links, or a known payload"
     mjcf = "the gear of the actuator"
     not_in_mjcf = ""

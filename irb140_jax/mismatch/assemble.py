@@ -8,7 +8,6 @@ from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.rows import Stretch
 from irb140_jax.mismatch.silent import LooseInertials
 
-TYPICAL_SHARE = 0.3  # prior standard deviation of an effect's torque, as a share of the joint's torque
 LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
 FEWEST_ROWS = 40  # of a joint: any explanation fits fewer, and what is left of them is no measure of noise
 ROUNDING = 1e-9  # of a joint's torque: a column that moves less moves nothing
@@ -49,8 +48,11 @@ def assemble(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data
     rms = np.sqrt(sum(np.einsum("tjk,tjk->jk", x, x) for x in amplitudes) / rows)
     with np.errstate(divide="ignore"):
         seen = rms > ROUNDING * torque[:, None]
-        typical = np.min(np.where(seen, TYPICAL_SHARE * torque[:, None] / np.where(seen, rms, 1), np.inf), axis=0)
+        typical = np.min(np.where(seen, torque[:, None] / np.where(seen, rms, 1), np.inf), axis=0)
     typical[~np.isfinite(typical)] = 0.0
+    for effect, sites, shapes, first in lib.blocks:
+        width = max(max(v) for v in effect.variants) + 1
+        typical[first : first + len(sites) * shapes.shape[1] * width] *= effect.typical
     for c in lib.candidates:
         if c.effect.tied:
             moves = typical[c.columns] > 0.0

@@ -11,7 +11,7 @@ from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, 
 from irb140_jax.mismatch.assemble import BLOCKS, assemble
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.explanation import Explanation, fitted
-from irb140_jax.mismatch.model import Named, better_known, composed
+from irb140_jax.mismatch.model import Named, Torques, better_known, composed
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.nuisances import nuisances
@@ -82,14 +82,16 @@ def explain(
         best, settings, sets = selected(space, chosen)
         return Explanation(lib, scales, data, extra, whitening, space, best, settings, sets, factor)
 
-    turn, coarse = 1, False
-    while turn < PASSES or (coarse and turn < MOST_PASSES):
+    turn, coarse, off = 1, False, False
+    while turn < PASSES or ((coarse or off) and turn < MOST_PASSES):
         ex = explained(turn, blocks=1)
         found = fitted(ex.data, ex.posterior(), ex.chosen, factor)
         physics = _physics(found)
         better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
         along, at = [seen_by(better, r) for r in along], point(robot, found[0], physics)
-        loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
+        torques = [_torques(lib, found, r, i) for i, r in enumerate(along)]
+        loads = [t.loads for t in torques]
+        off = _off(ex, torques, band)
         noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
         # A first grid is too coarse for any law to be right: with a discrepancy all its points are equally good.
         coarse = _coarse(ex)
@@ -107,10 +109,30 @@ def _physics(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> lis
     return [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
 
 
-def _loads(lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]], r: Prepared, index: int) -> Loads:
-    """Loads of an explanation (see `fitted`) along a recording."""
+def _torques(
+    lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]], r: Prepared, index: int
+) -> Torques:
+    """Torques of an explanation (see `fitted`) along a recording."""
     dphi, members, amplitudes = found
-    return composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi).loads
+    return composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi)
+
+
+def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
+    """Whether an explanation is another than its linearisation by more than noise at some joint: it has to be repeated.
+
+    Args:
+        ex: The explanation, linear in what is unknown.
+        torques: What its numbers give along the recordings, products of unknowns included.
+        band: Of the comparison.
+    """
+    post = ex.posterior()
+    w = post.mean * ex.data.scale[post.columns]
+    square = np.zeros(len(ex.settings))
+    for s, t in zip(ex.data.stretches, torques, strict=True):
+        linear = s.tau - s.y + s.X[..., post.columns] @ w
+        square += np.sum(np.where(s.use, band.apply(t.corrected) - linear, 0.0) ** 2, axis=0)
+    rows = np.maximum(sum(s.use.sum(axis=0) for s in ex.data.stretches), 1)
+    print("off", np.sqrt(square / rows) / ex.level, [m.slug for m in ex.members]); return bool(np.any(np.sqrt(square / rows) > ex.level))
 
 
 def _without_discrepancy(ex: Explanation) -> Explanation:

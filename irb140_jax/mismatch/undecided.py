@@ -10,7 +10,6 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.evidence import eliminated
 from irb140_jax.mismatch.explanation import Explanation
@@ -184,7 +183,10 @@ class _Table:
         H, _ = eliminated(space.gram(ex.settings, index, index), instrument)
         H = np.delete(np.delete(H, instrument, axis=0), instrument, axis=1)
         # What these recordings don't excite has no prior scale of theirs: that of lively motion stands in.
-        likely = TYPICAL_SHARE / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
+        typical = np.concatenate([np.zeros(0), *(
+            np.full(len(self._candidates[i].columns), self._candidates[i].effect.typical) for i in self._numbers
+        )])  # fmt: skip
+        likely = typical / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
         scale = ex.data.scale[nuisances + amplitudes]
         scale = np.where(matters.in_prior_units(amplitudes, scale) == 0.0, likely, scale)
         return H, scale, matters.in_prior_units(amplitudes, scale)
