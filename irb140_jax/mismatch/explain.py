@@ -132,7 +132,7 @@ def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
         linear = s.tau - s.y + s.X[..., post.columns] @ w
         square += np.sum(np.where(s.use, band.apply(t.corrected) - linear, 0.0) ** 2, axis=0)
     rows = np.maximum(sum(s.use.sum(axis=0) for s in ex.data.stretches), 1)
-    print("off", np.sqrt(square / rows) / ex.level, [m.slug for m in ex.members]); return bool(np.any(np.sqrt(square / rows) > ex.level))
+    return bool(np.any(np.sqrt(square / rows) > ex.level))
 
 
 def _without_discrepancy(ex: Explanation) -> Explanation:
