@@ -15,7 +15,7 @@ import numpy as np
 from scipy import linalg
 
 from irb140_jax.mismatch.assemble import Data
-from irb140_jax.mismatch.noise import Noise
+from irb140_jax.mismatch.noise import Noise, correlation_time
 from irb140_jax.mismatch.regression.nuisances import SCALED, Nuisances
 
 SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1)  # of a block, as a share of the joint's torque
@@ -221,7 +221,23 @@ def _joint_gram(
             out.append(part.T @ part)
             count.append(len(part))
             repeats.append(s.repeats)
-    # The likelihood is tempered by the correlation time of the residual.
-    grams, rows = np.stack(out) / noise.alike[j], np.array(count) / noise.alike[j]
+    alike = rows_alike(data, noise, misfit, j)
+    grams, rows = np.stack(out) / alike, np.array(count) / alike
     return JointGram(index, grams, extra[0].groups[j], rows, np.array(repeats), float(misfit[j]))
+
+
+def rows_alike(data: Data, noise: Noise, misfit: np.ndarray, j: int) -> float:
+    """How many rows of a joint count as one observation.
+
+    Sensor noise is independent from row to row.  What a law errs by is a function of the joint's state and stays the
+    same for as long as its speed does; and the residual shows for how many rows it stays the same at least.
+
+    Args:
+        data: Low-passed rows.
+        noise: Of the rows.
+        misfit: Share of the noise's variance that the sensors don't make, shape (n,).
+        j: The joint.
+    """
+    speed = [s.qd[:, j] - np.mean(s.qd[:, j]) for s in data.stretches]
+    return max(float(noise.alike[j]), 1.0 + float(misfit[j]) * (correlation_time(speed) - 1.0))
 
