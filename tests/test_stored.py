@@ -54,8 +54,8 @@ def with_value(value, *path):
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (with_value(2, "schema"), "schema 2, this version reads and writes schema 1"),
-        (with_value("1", "schema"), "schema '1'"),
+        (with_value(1, "schema"), "schema 1, this version reads and writes schema 2"),
+        (with_value("2", "schema"), "schema '2'"),
         (without("schema"), "no schema"),
         (without("phi_refit"), "'phi_refit' is missing"),
         (without("robot", "leaves", "mass"), "mass"),

@@ -57,7 +57,8 @@ class Discrepancy:
     @staticmethod
     def from_json(data: dict[str, Any]) -> "Discrepancy":
         """The inverse of `to_json`."""
-        sizes = {k: np.array(v, dtype=float) if isinstance(v, list) else float(v) for k, v in data["scales"].items()}
+        sizes: dict[str, Any] = {k: np.array(v, dtype=float) if isinstance(v, list) else float(v)
+                                 for k, v in data["scales"].items()}  # fmt: skip
         return Discrepancy(Scales(**sizes), np.array(data["coefficients"], dtype=float))
 
 
