@@ -22,7 +22,7 @@ from irb140_jax.mismatch.consistent import consistent, pseudo_inertia
 from irb140_jax.mismatch.model import CorrectedModel, Named, from_json, scaled, to_json, torques_along
 from irb140_jax.mismatch.native import NOTES, XML, native_gap, native_robot, save_native
 from irb140_jax.mismatch.notes import gap_notes
-from irb140_jax.mismatch.regression.discrepancy import Discrepancy
+from irb140_jax.mismatch.regression.discrepancy import FEATURES, Discrepancy
 from irb140_jax.recordings import Recording, read_recording
 from irb140_jax.recordings.conceal import random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec, rigid_torque
@@ -276,8 +276,8 @@ def test_the_model_survives_its_way_through_json():
 
 def carried(seed: int) -> Discrepancy:
     """Torque without a name on the first joint alone."""
-    coefficients = np.zeros((arm().n, 81))
-    coefficients[0] = 0.1 * np.random.default_rng(seed).normal(size=81)
+    coefficients = np.zeros((arm().n, FEATURES))
+    coefficients[0] = 0.1 * np.random.default_rng(seed).normal(size=FEATURES)
     one, m = np.ones(arm().n), motion()
     scales = Scales(np.abs(m.qd).max(axis=0), REST * one, 5.0 * one, m.q.min(axis=0), m.q.max(axis=0), 5.0, 0.1 * one,
                     1e-5 * one)  # fmt: skip
@@ -311,7 +311,7 @@ def test_what_a_model_carries_without_a_name_survives_its_way_through_json():
 
 @pytest.mark.parametrize("scale", [-0.2, 0.0, 0.15])
 def test_a_scale_of_all_torques_leaves_friction_as_it_was_logged_and_scales_the_load(scale):
-    plain, smooth = model("coulomb_friction", "load_dependent_friction", "gravity_spring"), as_conditioned(motion())
+    plain, smooth = model("coulomb_friction", "viscous_friction", "gravity_spring"), as_conditioned(motion())
     torques = torques_along(plain, smooth)
     friction = torques.corrected - torques.loads.load
     assert np.std(friction[:, 0]) > 0.01
