@@ -185,8 +185,10 @@ def test_a_mean_under_noise_that_falls_with_frequency_is_not_called_surer_than_i
         x = a_noise_of([-pole], 1000, seed)
         noise = noise_from_residuals([x], [np.ones(x.shape, dtype=bool)], np.zeros(1))
         one, y = (noise.whitened(v, 0, 0)[ORDER:] for v in (np.ones(len(x)), x[:, 0]))
-        misses.append((one @ y) / np.sqrt(one @ one))
-    # In claimed standard deviations; 200 draws know theirs to 5 %, and a spectrum of 10 lags its peak to some 10 %.
+        # So many rows as are alike count as one: the variance of the mean is that of white noise times their number.
+        misses.append((one @ y) / np.sqrt(noise.alike[0] * (one @ one)))
+    # In claimed standard deviations; 200 draws know theirs to 5 %, and a record of some hundred correlation times, or
+    # fewer, its own number of rows alike to some 15 %.
     assert np.sqrt(np.mean(np.square(misses))) < 1.2
 
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scipy import signal, stats
+from scipy import signal, special, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
@@ -13,6 +13,7 @@ from irb140_jax.mismatch.regression.gram import LEVELS, ONE, SIZES, JointGram, l
 from irb140_jax.mismatch.selection.averages import probabilities
 from irb140_jax.mismatch.selection.evidence import Space
 from irb140_jax.mismatch.selection.search import Search
+from irb140_jax.mismatch.silent import SILENT
 
 ROWS, INERTIALS, COMMON, OWN = 60, 3, 1, 5
 SLUGS = ("coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia")
@@ -160,8 +161,40 @@ def test_a_motion_played_again_is_worth_what_averaging_its_rows_would_make_of_it
 @pytest.mark.parametrize("pole", [0.0, 0.5, 0.9])
 def test_rows_that_are_alike_count_as_the_mean_of_a_process_is_known(pole):
     rng = np.random.default_rng(8)
-    series = [signal.lfilter([1.0], [1.0, -pole], rng.normal(size=20_000)) for _ in range(2)]
+    series = [np.asarray(signal.lfilter([1.0], [1.0, -pole], rng.normal(size=20_000))) for _ in range(2)]
     assert correlation_time(series) == pytest.approx((1.0 + pole) / (1.0 - pole), rel=0.15)
+
+
+def test_a_sets_shapes_are_summed_over_one_member_at_a_time():
+    """Columns 1 to 3 and 5 to 6 are shapes of one law each: the sum over the sets that differ from this one in it."""
+    space, data = planted(10, {1: 1.0, 6: 1.0})
+    shapes = {1: (1, 2, 3), 5: (5, 6)}
+    candidates = list(space.candidates)
+    for first, points in shapes.items():
+        for k in points:
+            candidates[k] = dataclasses.replace(candidates[first], shape=np.array([float(k)]), columns=np.array([k]))
+    space = dataclasses.replace(space, candidates=tuple(candidates))
+    settings, chosen = (SETTING, SETTING), (0, 1, 6)
+    best, expected = density(space, data, chosen, settings), 0.0
+    for member, points in ((1, shapes[1]), (6, shapes[5])):
+        rest = tuple(c for c in chosen if c != member)
+        sets = [tuple(sorted((*rest, k))) for k in points]
+        expected += special.logsumexp([density(space, data, s, settings) for s in sets]) - best
+    assert expected > 0.0
+    assert space.over_shapes(chosen, settings) == pytest.approx(expected, abs=1e-8)
+    assert space.over_shapes((0,), settings) == 0.0
+
+
+def test_inertials_of_all_links_and_those_of_one_are_not_loose_at_once():
+    space, _ = planted(11, {})
+    free = np.full(1, np.inf)
+    loose = [Candidate(SILENT["inertials"], joints, np.zeros(0), np.array([k]), (0,), -free, free)
+             for k, joints in enumerate([(0,), (1,), (0, 1)])]  # fmt: skip
+    space = dataclasses.replace(space, candidates=(*space.candidates[:-3], *loose))
+    one, other, every = range(len(space.candidates) - 3, len(space.candidates))
+    assert space.conflicts((every,))[[one, other, every]].all()
+    assert space.conflicts((one,))[[one, every]].all() and not space.conflicts((one,))[other]
+    assert not space.conflicts((every,))[:one].any()  # beside any law
 
 
 def test_blocks_left_out_are_as_if_they_had_not_been_recorded():

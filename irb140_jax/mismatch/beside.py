@@ -28,7 +28,7 @@ class Beside:
         They are the effect itself, and what absorbs it or is absorbed.
         """
         kinds = self._kind[list(chosen)]
-        return self._excludes[kinds].any(axis=0)[self._kind]
+        return np.any(self._excludes[kinds], axis=0)[self._kind]
 
     @cached_property
     def _excludes(self) -> np.ndarray:

@@ -43,7 +43,9 @@ def of_bodies(
     off = lambda x: np.concatenate([link.errors(v) for link, v in each(x)]) - errors[rows]  # noqa: E731
     slope = lambda x: whiten @ linalg.block_diag(*(link.slopes(v) for link, v in each(x)))  # noqa: E731
     start = np.concatenate([link.start(errors[link.rows]) for link in free])
-    best = optimize.least_squares(lambda x: whiten @ off(x), start, slope, method="lm", max_nfev=TRIALS).x
+    best = optimize.least_squares(
+        lambda x: whiten @ off(x), start, slope, method="lm", max_nfev=TRIALS  # pyright: ignore[reportArgumentType]
+    ).x
     return mean + (cov @ into.T)[:, rows] @ np.linalg.solve(spread, off(best))
 
 

@@ -40,7 +40,8 @@ def _inertials_matter(ex: Explanation) -> bool:
     if any(ex.data.candidates[c].slug == "inertials" for c in ex.chosen):
         return True
     space, instrument = ex.space, np.arange(ex.space.inertials, ex.space.offset)
-    H = space.gram(ex.settings, *(2 * [space.with_y(np.concatenate([instrument, np.arange(space.inertials)]))]))
+    every = space.with_y(np.concatenate([instrument, np.arange(space.inertials)]))
+    H = space.gram(ex.settings, every, every)
     left, _ = eliminated(H, np.arange(len(instrument)))
     return gain_of(left, len(instrument) + np.arange(space.inertials)) > NO_BETTER
 

@@ -22,6 +22,7 @@ ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which a sign is rou
 LATE = (-0.01, -0.005, 0.005, 0.01, 0.02)  # s by which friction turns before or after the joint
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
+FEATURES = 78  # of both blocks
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Discrepancy:
 
     Attributes:
         scales: Sizes of the recordings that it was found in.
-        coefficients: Of each joint's smooth and reversal features [N m or N], zero where nothing is carried, (n, 81).
+        coefficients: Of each joint's smooth and reversal features [N m or N], zero where nothing is carried, shape
+            (n, FEATURES).
     """
 
     scales: Scales
@@ -57,12 +59,13 @@ class Discrepancy:
     @staticmethod
     def from_json(data: dict[str, Any]) -> "Discrepancy":
         """The inverse of `to_json`."""
-        sizes = {k: np.array(v, dtype=float) if isinstance(v, list) else float(v) for k, v in data["scales"].items()}
+        sizes: dict[str, Any] = {k: np.array(v, dtype=float) if isinstance(v, list) else float(v)
+                                 for k, v in data["scales"].items()}  # fmt: skip
         return Discrepancy(Scales(**sizes), np.array(data["coefficients"], dtype=float))
 
 
 def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
-    """Smooth functions of one joint's state, shape (T, 40).
+    """Smooth functions of one joint's state, shape (T, 37).
 
     Args:
         r: T samples of n joints.

@@ -37,7 +37,7 @@ class Nuisances:
 
 
 def feature_coefficients(extra: Nuisances, own: Sequence[np.ndarray], joints: np.ndarray) -> np.ndarray:
-    """Coefficients of the discrepancy's features themselves, zero but at some joints, shape (n, 81).
+    """Coefficients of the discrepancy's features themselves, zero but at some joints, shape (n, FEATURES).
 
     Args:
         extra: Of any recording.
