@@ -41,6 +41,7 @@ class Backlash(AbstractEffect):
     )
     variants = ((0, 1),)
     own = (0,)
+    settled = 0.6  # the shape holds the gap, so the amplitude is one but for the grid; less is another law's shadow
     confused_with = {
         "presliding_hysteresis": "reversals under several preloads",
         "joint_elasticity": "load reversals of several sizes: a gap is crossed whole, a spring bends with the load",

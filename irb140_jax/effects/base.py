@@ -65,6 +65,7 @@ class AbstractEffect(abc.ABC):
         vector: Its amplitudes are components of one vector: what the data can't see of it may be larger than the rest.
         silent: A candidate of the search that is no left-out physics: it is never reported as a finding.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
+        settled: Least amplitude of those once the grid of shapes is fine.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
         steps: Whether it can be simulated forward in time all the same (see `memory` and `step`).
     """
@@ -96,8 +97,10 @@ class AbstractEffect(abc.ABC):
     adds_up: ClassVar[bool] = False
     tied: ClassVar[bool] = False
     vector: ClassVar[bool] = False
+    alters: ClassVar[str | None] = None
     silent: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)
+    settled: ClassVar[float] = -np.inf
     history: ClassVar[str | None] = None
     steps: ClassVar[bool] = False
 

@@ -19,6 +19,7 @@ from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
+from irb140_jax.mismatch.silent import SoftFriction
 from irb140_jax.mismatch.tangent import Point, point
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
@@ -49,7 +50,7 @@ def explain(
         sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         progress: Told what is being done.
     """
-    factor = inertial_prior_factor(robot, 1.0)
+    factor, effects = inertial_prior_factor(robot, 1.0), (*effects, SoftFriction())
     progress("rigid body along the recordings")
     along = [prepared(robot, r) for r in recordings]
     scales = scales_of(along)
@@ -78,7 +79,7 @@ def explain(
         known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in zip(along, loads, strict=True)]
         extra = nuisances(robot, along, known, band, scales)
         whitening = noise or flexible_noise(data, extra)
-        space = space_of(data, extra, whitening, lib, first, sensors, blocks)
+        space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1)
         best, settings, sets = selected(space, chosen)
         return Explanation(lib, scales, data, extra, whitening, space, best, settings, sets, factor)
 

@@ -14,6 +14,7 @@ from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
 SLOPE = SCALED.index("slope")
+FAR = 3.0  # prior standard deviations from which an error of the instrument is a finding of its own
 NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
 
 
@@ -106,7 +107,7 @@ def skew_notes(ex: Explanation) -> list[str]:
         own = ex.space.own(j, setting, columns, mean, instrument=True)[delay]
         spread = g.at(setting).spread()[delay]
         odds = stats.norm.logpdf(0.0) - stats.norm.logpdf(0.0, own, spread) + np.log(RARE)
-        if odds > 0.0:
+        if odds > 0.0 and abs(own) > FAR:
             out.append(
                 f"Torque of {ex.lib.robot.joint_names[j]} is logged {1e3 * DELAY_JOINT * abs(own):.2g} +- "
                 f"{1e3 * DELAY_JOINT * spread:.1g} ms {'early' if own > 0.0 else 'late'} beside its position and the "

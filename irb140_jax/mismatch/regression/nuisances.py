@@ -12,7 +12,7 @@ from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
 GAIN_COMMON, GAIN_JOINT = 0.10, 0.03  # torque scale of all joints, and of each beside it
-DELAY_COMMON, DELAY_JOINT = 1e-3, 2e-3  # s between torque and position channels, read one after the other
+DELAY_COMMON, DELAY_JOINT = 1e-3, 5e-4  # s between torque and position channels
 SMOOTHED = 2e-5  # s^2 of the torque's second derivative: what smoothing takes off accelerations that noise hides
 ROTOR = 0.10  # of the stated armature
 FIXED = ("gain", "delay", "rotor", "smoothing")  # a joint's own columns with stated widths, in their order

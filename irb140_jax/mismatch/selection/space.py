@@ -18,7 +18,7 @@ EVENT = 0.2  # s before what happens once, or after it, that must be recorded
 
 def space_of(
     data: Data, extra: Sequence[Nuisances], noise: Noise, lib: Library, first: Library, sensors: np.ndarray,
-    blocks: int = 1,
+    blocks: int = 1, *, settled: bool = True,
 ) -> Space:  # fmt: skip
     """Gram matrices of the rows, with the prior probability of every candidate.
 
@@ -30,6 +30,7 @@ def space_of(
         first: The library before its shapes were refined: what was to be expected of them.
         sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         blocks: Contiguous blocks per recording.
+        settled: Whether the grids of shapes have been refined.
     """
     common, candidates = extra[0].common.shape[-1], data.candidates
     width = max(len(c.columns) for c in candidates)
@@ -42,6 +43,8 @@ def space_of(
         # What is there only if it is more than nothing, but moves nothing here, can't be found.
         unseen = (s == 0.0) & (c.lowest == 0.0) | (c.effect.once and _throughout(data, c))
         low, high = c.lowest, c.highest
+        if settled:
+            low = np.where(np.isin(c.variant, c.effect.own), np.maximum(low, c.effect.settled), low)
         if len(c.shape) and (s > 0.0).all():
             at_least, at_most = c.effect.at_shape(c.shape)
             low = np.maximum(low, at_least[list(c.variant)])
