@@ -97,7 +97,6 @@ class AbstractEffect(abc.ABC):
     adds_up: ClassVar[bool] = False
     tied: ClassVar[bool] = False
     vector: ClassVar[bool] = False
-    alters: ClassVar[str | None] = None
     silent: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)
     settled: ClassVar[float] = -np.inf

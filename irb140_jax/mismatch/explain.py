@@ -19,7 +19,6 @@ from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
-from irb140_jax.mismatch.silent import SoftFriction
 from irb140_jax.mismatch.tangent import Point, point
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
@@ -50,7 +49,7 @@ def explain(
         sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         progress: Told what is being done.
     """
-    factor, effects = inertial_prior_factor(robot, 1.0), (*effects, SoftFriction())
+    factor = inertial_prior_factor(robot, 1.0)
     progress("rigid body along the recordings")
     along = [prepared(robot, r) for r in recordings]
     scales = scales_of(along)
