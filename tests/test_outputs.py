@@ -409,7 +409,9 @@ def test_an_interrupt_while_files_take_their_place_waits_until_they_have(number,
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_command_leaves_nothing(number, code, recording, tmp_path):
     planted = (
-        "import sys, time, irb140_jax.recordings as r\n"
+        # A shell's background job, as tests may be, ignores interruptions, and hands that on.
+        "import signal, sys, time, irb140_jax.recordings as r\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def read_recording(*_, **__):\n    print('reading', flush=True)\n    time.sleep(60)\n"
         "r.read_recording = read_recording\nfrom irb140_jax.cli import main\nsys.exit(main())"
     )
