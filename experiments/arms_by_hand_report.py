@@ -6,9 +6,11 @@ import pathlib
 import numpy as np
 from hand_arms import ARMS
 from hand_laws import ORDINARY
-from pages import page_of
+from pages import FIRST_ENGINE, page_of
 
-OPENING = """# Arms and physics by hand
+OPENING = f"""# Arms and physics by hand
+
+{FIRST_ENGINE}
 
 Written by `experiments/arms_by_hand.py` from `results/arms_by_hand_*.jsonl`; don't edit. There are six arms: a
 pendulum, two links, SCARA, gantry, cylindrical, and seven joints. Their MJCF, control and hidden physics are written

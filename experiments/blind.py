@@ -17,7 +17,7 @@ from typing import Literal
 import jax
 import numpy as np
 import tyro
-from pages import page_of
+from pages import FIRST_ENGINE, page_of
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.errors import InputError
@@ -109,6 +109,8 @@ def table(out: pathlib.Path) -> str:
     """The page with all figures, from the result files."""
     lines = [
         "# Concealed physics: what the diagnosis finds",
+        "",
+        FIRST_ENGINE,
         "",
         "Written by `experiments/blind.py --table` from `results/blind_*.jsonl`. MuJoCo simulates the robot in closed",
         "loop. Its inertials are 5 % wrong, encoder noise is 2e-5 rad, and torque noise is 1 %. There are three",

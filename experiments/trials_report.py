@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from pages import page_of
+from pages import FIRST_ENGINE, page_of
 
 from irb140_jax.effects.catalogue import CATALOGUE
 
@@ -310,6 +310,8 @@ def write(out: pathlib.Path) -> None:
     """Write docs/trials.md from the result files."""
     lines = [
         "# Trials: concealed physics of every kind",
+        "",
+        FIRST_ENGINE,
         "",
         "Written by `experiments/trials.py` from `results/trials_*.jsonl`. MuJoCo drives the arm in closed loop,",
         "inertials 5 % wrong; three recordings of 15 s; the IRB 140 and random robots of 1 to 7 joints with slides.",

@@ -135,14 +135,16 @@ def markdown(head: tuple[str, ...], rows: Rows) -> str:
     return "\n".join([first, "|" + "---|" * len(head), *rest])
 
 
-def section(name: str, every: Lines) -> dict[str, Any]:
-    """What the page says of a draw."""
+def section(name: str, every: Lines, first: Lines) -> dict[str, Any]:
+    """What the page says of a draw; `first` are the same cases by the first engine, where those are stored."""
+    same = {x["index"] for x in every if x["diagnosis"]}
+    before = [x for x in first if x["diagnosis"] and x["index"] in same]
     lines = [x for x in every if x["diagnosis"]]
     kinds = lambda line: [(c["kind"], c["how"]) for c in scoring.stated_classes(line) if c["slug"]]  # noqa: E731
     return {
         "name": name, "cases": len(every), "last": max(x["index"] for x in every), "diagnosed": len(lines),
         "engine": engines(every), "seconds": f"{np.median([x['seconds'] for x in lines]):.0f}",
-        "figures": markdown(("measure", "figure (95 % interval)", "goal"), figures(lines)),
+        "figures": side_by_side(lines, before), "before": len(before), "before_engine": engines(before),
         "coverage": markdown(("effect", "parameters", *(f"{100 * x:.0f} %" for x in LEVELS)), coverage(lines)),
         "outcomes": markdown(("hidden", "times", *WAYS), tally(lines, kinds, WAYS)),
         "places": markdown(("hidden", "times", *PLACES), tally(lines, scoring.located, PLACES)),
@@ -150,6 +152,15 @@ def section(name: str, every: Lines) -> dict[str, Any]:
         "others": [f"{x['index']} ({' + '.join(x['kinds'])}): {x.get('refused') or x.get('failed')}"
                    for x in every if not x["diagnosis"]],
     }  # fmt: skip
+
+
+def side_by_side(lines: Lines, before: Lines) -> str:
+    """The table of figures, with those of the first engine where it was run."""
+    rows = figures(lines)
+    if not before:
+        return markdown(("measure", "figure (95 % interval)", "goal"), rows)
+    both = [(name, old, new, goal) for (name, old, _), (_, new, goal) in zip(figures(before), rows, strict=True)]
+    return markdown(("measure", "first engine", "figure (95 % interval)", "goal"), both)
 
 
 def engines(lines: Lines) -> str:
@@ -161,7 +172,9 @@ def main() -> None:
     """Write the page and its figures."""
     draws = {name: runner.read(runner.stored(name)) for name in ("final", "check", "work")}
     draws = {name: every for name, every in draws.items() if any(x["diagnosis"] for x in every)}
-    looks = [runner.read(path) for path in sorted(runner.RESULTS.glob("testbed_check*.jsonl"))]
+    # The file without a label is the last look.
+    files = sorted(runner.RESULTS.glob("testbed_check*.jsonl"), key=lambda path: path.stem == "testbed_check")
+    looks = [runner.read(path) for path in files]
     for name, every in draws.items():
         diagram.draw([x for x in every if x["diagnosis"]], ROOT / "docs" / "figures" / f"calibration_{name}.svg")
     probes = [x for x in runner.read(runner.RESULTS / "testbed_probes.jsonl") if x["diagnosis"]]
@@ -173,7 +186,7 @@ def main() -> None:
     ).render(
         mixture=", ".join(f"{n} {name}" if n > 1 else name for name, n in many.items()),
         looks=[{"engine": engines(look), "cases": len(look)} for look in looks],
-        draws=[section(name, every) for name, every in draws.items()],
+        draws=[section(name, every, runner.read(runner.stored(name, "first"))) for name, every in draws.items()],
         probes=markdown(head, [probe_row(x) for x in probes]) if probes else "", probes_engine=engines(probes),
     )  # fmt: skip
     (ROOT / "docs" / "calibration.md").write_text(text, encoding="utf-8")

@@ -29,7 +29,8 @@ def false_names(line: dict[str, Any], ordinary: bool = False) -> list[dict[str, 
     live = [h for h in line["truth"]["hidden"] if not (len(h["joints"]) == 1 and set(h["joints"]) <= dead)]
     return [
         f for f in line["diagnosis"]["findings"]
-        if (f["effect"] in ORDINARY) == ordinary and not any(matches(f, h) for h in live)
+        if (f["effect"] in ORDINARY) == ordinary
+        and not all(any(matches(f | {"joints": [j]}, h) for h in live) for j in f["joints"])
     ]  # fmt: skip
 
 

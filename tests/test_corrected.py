@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import json
 
 import equinox as eqx
 import helpers_recordings
@@ -13,20 +14,21 @@ import pytest
 
 import irb140_jax as irb
 from irb140_jax.control import Reference, SlidingMode
-from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import corrected_robot, predict, prediction_times
 from irb140_jax.mismatch.consistent import consistent, pseudo_inertia
-from irb140_jax.mismatch.model import CorrectedModel, Named, from_json, to_json, torques_along
+from irb140_jax.mismatch.model import CorrectedModel, Named, from_json, scaled, to_json, torques_along
 from irb140_jax.mismatch.native import NOTES, XML, native_gap, native_robot, save_native
 from irb140_jax.mismatch.notes import gap_notes
+from irb140_jax.mismatch.regression.discrepancy import FEATURES, Discrepancy
 from irb140_jax.recordings import Recording, read_recording
 from irb140_jax.recordings.conceal import random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec, rigid_torque
-from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.condition import Conditioned, condition
 from irb140_jax.recordings.excite import fourier_motion
-from irb140_jax.recordings.low_pass import Band
+from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.robot import load_robot, robot_from_model, robot_mjcf
 from irb140_jax.simulate import play
 
@@ -270,6 +272,52 @@ def test_the_model_survives_its_way_through_json():
     some, m = model("coulomb_friction", "torque_gain"), motion()
     again = from_json(to_json(some))
     np.testing.assert_array_equal(torque_along(corrected_robot(again), m), torque_along(corrected_robot(some), m))
+
+
+def carried(seed: int) -> Discrepancy:
+    """Torque without a name on the first joint alone."""
+    coefficients = np.zeros((arm().n, FEATURES))
+    coefficients[0] = 0.1 * np.random.default_rng(seed).normal(size=FEATURES)
+    one, m = np.ones(arm().n), motion()
+    scales = Scales(np.abs(m.qd).max(axis=0), REST * one, 5.0 * one, m.q.min(axis=0), m.q.max(axis=0), 5.0, 0.1 * one,
+                    1e-5 * one)  # fmt: skip
+    return Discrepancy(scales, coefficients)
+
+
+def recorded(m) -> Recording:
+    return Recording(t=m.t, q=m.q, tau=0.0 * m.q, joint_names=arm().joint_names, source="made")
+
+
+def test_a_model_predicts_with_what_it_carries_without_a_name_behind_the_same_low_pass():
+    plain = model("coulomb_friction", "torque_gain")
+    unnamed, log = carried(1), recorded(motion())
+    some, smooth = dataclasses.replace(plain, discrepancy=unnamed), condition(log, plain.band, pad=True)
+    rest = unnamed.along(smooth, torques_along(plain, smooth).loads.load)
+    assert np.std(rest[:, 0]) > 0.01 and not rest[:, 1].any()
+    rest = filtered(rest, kernels(plain.band.position, plain.band.rate)[0])
+    difference = predict(some, log)["corrected"] - predict(plain, log)["corrected"]
+    expected = np.stack([np.interp(log.t, smooth.t, x) for x in rest.T], axis=1)
+    np.testing.assert_allclose(difference, expected, rtol=0, atol=1e-9)  # rounding
+    for kind in ("nominal", "refit"):
+        np.testing.assert_array_equal(predict(some, log)[kind], predict(plain, log)[kind])
+
+
+def test_what_a_model_carries_without_a_name_survives_its_way_through_json():
+    some, log = dataclasses.replace(model("coulomb_friction"), discrepancy=carried(2)), recorded(motion())
+    again = from_json(json.loads(json.dumps(to_json(some))))
+    np.testing.assert_array_equal(predict(again, log)["corrected"], predict(some, log)["corrected"])
+    assert from_json(to_json(model("coulomb_friction"))).discrepancy is None
+
+
+@pytest.mark.parametrize("scale", [-0.2, 0.0, 0.15])
+def test_a_scale_of_all_torques_leaves_friction_as_it_was_logged_and_scales_the_load(scale):
+    plain, smooth = model("coulomb_friction", "viscous_friction", "gravity_spring"), as_conditioned(motion())
+    torques = torques_along(plain, smooth)
+    friction = torques.corrected - torques.loads.load
+    assert np.std(friction[:, 0]) > 0.01
+    some = dataclasses.replace(plain, named=scaled(arm().n, plain.named, scale))
+    logged = torques_along(some, smooth).corrected
+    np.testing.assert_allclose(logged, (1.0 + scale) * torques.loads.load + friction, rtol=1e-9, atol=1e-9)
 
 
 def test_a_folder_without_a_diagnosis_is_refused(tmp_path):

@@ -60,7 +60,7 @@ def test_positions_that_limit_the_comparison_are_said(step, said):
 def proof(left: float, rows: int = 2000) -> HeldOut:
     """Errors of this size on a joint, on so many rows."""
     error = np.full((rows, 1), left)
-    return HeldOut([error], [error], [error], [np.ones((rows, 1), dtype=bool)], np.ones(1))
+    return HeldOut([error], [error], [error], [error], [np.ones((rows, 1), dtype=bool)], np.zeros(1, dtype=bool))
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from irb140_jax.mismatch.evidence import Layout, eliminated, gain_of, gains, half_of, log_determinants, posterior, root
+from irb140_jax.mismatch.evidence import eliminated, gain_of, posterior, root
 
 EXPONENTS = [0.0, 3.0, 6.0, 9.0]  # of ten, the sizes that columns differ by
 
@@ -25,10 +25,6 @@ def singular(seed: int, exponent: float, columns: int = 12, rows: int = 40) -> n
 def test_gains_and_amplitudes_of_singular_columns_are_finite(seed, exponent):
     H = singular(seed, exponent)
     H, cost = eliminated(H, np.arange(4))
-    groups = [Layout(np.arange(4), np.arange(4, 12).reshape(4, 2)), Layout(np.arange(4, 8), np.arange(4, 8)[:, None])]
-    for half in (None, half_of(H, np.array([10, 11]), np.arange(13))):
-        gain, mean = gains(H, groups, 8, 2, half)
-        assert np.isfinite(gain).all() and np.isfinite(mean[:4]).all() and np.isfinite(mean[4:, 0]).all()
     post = posterior(H, np.arange(4, 12), [slice(0, 3)])
     assert np.isfinite(cost) and np.isfinite(post.mean).all() and (np.diag(post.cov) >= 0.0).all()
     assert np.isfinite(gain_of(H, np.arange(4, 12)))
@@ -48,6 +44,3 @@ def test_the_root_of_a_matrix_that_rounding_spoiled_is_that_of_the_nearest_with_
     L = root(spoiled)
     np.testing.assert_allclose(L @ L.T, mended, atol=1e-9)
     np.testing.assert_allclose(L, np.tril(L))
-    both = np.stack([spoiled, mended])
-    np.testing.assert_allclose(log_determinants(both), np.log(7e4), rtol=1e-9)
-    np.testing.assert_allclose(both[0], mended, atol=1e-9)

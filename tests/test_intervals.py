@@ -1,14 +1,16 @@
 """Intervals of physical parameters: what the doubt about amplitudes makes of them."""
 
-import dataclasses
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
-from helpers_problem import ROWS, problem
 
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.intervals import _variance_about_shape, _variance_of
+
+ROWS = 80
 
 
 def test_the_variance_of_what_is_linear_is_exact():
@@ -34,12 +36,13 @@ def test_a_wall_that_leans_and_stands_off_is_known_as_both_free_at_once_allow():
     push = lambda shape: shape[3] - x @ shape[:3]  # noqa: E731
     turns = 1e-4 * np.array([[0.0, 1.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, -1.0]])
     shapes = wall + np.vstack([np.zeros(4), turns])
-    made = problem([("contact", (0,), [push(s)]) for s in shapes], [stiffness * push(wall)])
-    walls = tuple(dataclasses.replace(c, shape=s) for c, s in zip(made.candidates, shapes, strict=True))
-    made = dataclasses.replace(made, candidates=walls)
+    effect, one = CATALOGUE["contact"], np.array([np.inf])
+    walls = tuple(Candidate(effect, (0,), s, np.array([k]), (0,), -one, one) for k, s in enumerate(shapes))
+    X = np.column_stack([*(push(s) for s in shapes), stiffness * push(wall)])
+    near = lambda _, columns: (X.T @ X)[np.ix_([*columns, len(shapes)], [*columns, len(shapes)])]  # noqa: E731
     data = SimpleNamespace(candidates=walls, nuisances=0, scale=np.full(len(walls), 1.0))
-    explanation = cast(Any, SimpleNamespace(problem=made, data=data, chosen=(0,)))
-    found = _variance_about_shape(explanation, 0, np.array([stiffness]), 1.0)
+    explanation = cast(Any, SimpleNamespace(near=near, data=data, others=lambda _: ()))
+    found = _variance_about_shape(explanation, 0, np.array([stiffness]))
     # Least squares over stiffness, lean and position, from the derivatives written out.
     slope = np.stack([push(wall), -stiffness * x[:, 1], np.full(ROWS, stiffness)], axis=1)
     cov = np.linalg.inv(slope.T @ slope + np.diag([1.0, 0.0, 0.0]))

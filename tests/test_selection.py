@@ -4,19 +4,21 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import signal, special, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.regression.gram import LEVELS, SIZES, JointGram, log_prior, own_scale
+from irb140_jax.mismatch.noise import correlation_time
+from irb140_jax.mismatch.regression.gram import LEVELS, ONE, SIZES, JointGram, log_prior, own_scale
 from irb140_jax.mismatch.selection.averages import probabilities
 from irb140_jax.mismatch.selection.evidence import Space
 from irb140_jax.mismatch.selection.search import Search
+from irb140_jax.mismatch.silent import SILENT
 
 ROWS, INERTIALS, COMMON, OWN = 60, 3, 1, 5
 SLUGS = ("coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia")
 GROUPS = np.array([-1, 0, 0, 1, 2])
-SETTING = (3, 4, 2, 1)
+SETTING = (3, 4, 2, ONE + 1)
 
 
 def planted(seed: int, amplitudes: dict[int, float]) -> tuple[Space, list[dict[str, np.ndarray]]]:
@@ -44,7 +46,8 @@ def planted(seed: int, amplitudes: dict[int, float]) -> tuple[Space, list[dict[s
         data.append({"E": E, "X": X, "y": y, "mine": np.array(mine)})
     prior = np.full(len(candidates), np.log(0.05))
     free = np.full((len(candidates), 1), np.inf)
-    space = Space(tuple(joints), tuple(candidates), INERTIALS, INERTIALS + COMMON, size, prior, -free, free)
+    nothing = np.zeros((len(candidates), 1)), -free[:, 0]
+    space = Space(tuple(joints), tuple(candidates), INERTIALS, INERTIALS + COMMON, size, prior, -free, free, *nothing)
     return space, data
 
 
@@ -70,7 +73,7 @@ def density(space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, 
 @pytest.mark.parametrize("chosen", [(), (0,), (1, 6), (0, 3, 5)])
 def test_the_evidence_of_a_set_is_the_density_of_the_data(chosen):
     space, data = planted(1, {0: 1.0, 5: 0.5})
-    settings = (SETTING, (0, 2, 6, 0))
+    settings = (SETTING, (0, 2, 5, ONE))
     expected = density(space, data, chosen, settings) + sum(map(log_prior, settings)) + len(chosen) * np.log(0.05)
     assert space.log_evidence(chosen, settings) == pytest.approx(expected, abs=1e-8)
 
@@ -85,7 +88,7 @@ def test_screening_says_what_the_evidence_says():
 
 def test_the_posterior_is_that_of_the_data():
     space, data = planted(3, {1: 1.0})
-    settings, chosen = (SETTING, (2, 0, 0, 3)), (1, 4)
+    settings, chosen = (SETTING, (2, 0, 0, ONE + 3)), (1, 4)
     mean, cov = space.posterior(chosen, settings)
     columns, precision, moment = space.set_columns(chosen), np.eye(INERTIALS + COMMON + 2), 0.0
     for d, setting in zip(data, settings, strict=True):
@@ -108,7 +111,8 @@ def test_settings_that_are_settled_have_no_better_neighbour_one_step_away():
             for step in (-1, 1):
                 trial = list(settings[j])
                 trial[axis] += step
-                if 0 <= trial[axis] < (len(LEVELS) if axis == len(SETTING) - 1 else len(SIZES)):
+                low, high = (ONE, len(LEVELS)) if axis == len(SETTING) - 1 else (0, len(SIZES))
+                if low <= trial[axis] < high:
                     other = tuple(tuple(trial) if i == j else s for i, s in enumerate(settings))
                     assert space.log_evidence((0,), other) <= value + 2e-3
 
@@ -116,9 +120,9 @@ def test_settings_that_are_settled_have_no_better_neighbour_one_step_away():
 @pytest.mark.parametrize("true", [(), (0,), (1, 6), (0, 2, 5)])
 def test_the_search_finds_what_was_planted_and_is_sure_of_it(true):
     space, _ = planted(5, dict.fromkeys(true, 2.0))
-    search = Search(space, ((0, 0, 0, 0),) * 2)
+    search = Search(space, ((0, 0, 0, ONE),) * 2)
     assert search.run() == true
-    sure = probabilities(search)
+    sure = probabilities(space.candidates, {s: v for s, (v, _) in search.visited.items()})
     for c, candidate in enumerate(space.candidates):
         p = sure.get((candidate.slug, candidate.joints), 0.0)
         assert p > 0.99 if c in true else p < 0.3, (candidate.slug, candidate.joints, p)
@@ -135,6 +139,69 @@ def test_amplitudes_that_are_not_admissible_make_a_set_impossible():
 
 
 def test_the_prior_of_the_sizes_is_a_probability():
-    total = sum(np.exp(log_prior((k, 0, 0, 0)) - log_prior((0, 0, 0, 0))) for k in range(len(SIZES)))
+    total = sum(np.exp(log_prior((k, 0, 0, ONE)) - log_prior((0, 0, 0, ONE))) for k in range(len(SIZES)))
     first = 2.0 / np.pi * np.arctan(0.5 * SIZES[1] / 0.03)
     assert total * first == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("misfit", [0.0, 0.5, 0.9])
+def test_a_motion_played_again_is_worth_what_averaging_its_rows_would_make_of_it(misfit):
+    """Sensor noise differs from run to run; what a model errs by is the same: their mean is the sufficient number."""
+    rng, times = np.random.default_rng(7), 3
+    x = rng.normal(size=ROWS)
+    runs = [x * 0.7 + rng.normal(size=ROWS) for _ in range(times)]
+    grams = np.array([np.stack([x, y]) @ np.stack([x, y]).T for y in runs])
+    gram = JointGram(np.array([0, 1]), grams, np.zeros(0, int), np.full(times, ROWS), np.full(times, times), misfit)
+    (precision, moment), _ = gram.weighted(1.0)[0]
+    variance = (1.0 - misfit) / times + misfit
+    assert precision == pytest.approx(x @ x / variance)
+    assert moment == pytest.approx(x @ np.mean(runs, axis=0) / variance)
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.5, 0.9])
+def test_rows_that_are_alike_count_as_the_mean_of_a_process_is_known(pole):
+    rng = np.random.default_rng(8)
+    series = [np.asarray(signal.lfilter([1.0], [1.0, -pole], rng.normal(size=20_000))) for _ in range(2)]
+    assert correlation_time(series) == pytest.approx((1.0 + pole) / (1.0 - pole), rel=0.15)
+
+
+def test_a_sets_shapes_are_summed_over_one_member_at_a_time():
+    """Columns 1 to 3 and 5 to 6 are shapes of one law each: the sum over the sets that differ from this one in it."""
+    space, data = planted(10, {1: 1.0, 6: 1.0})
+    shapes = {1: (1, 2, 3), 5: (5, 6)}
+    candidates = list(space.candidates)
+    for first, points in shapes.items():
+        for k in points:
+            candidates[k] = dataclasses.replace(candidates[first], shape=np.array([float(k)]), columns=np.array([k]))
+    space = dataclasses.replace(space, candidates=tuple(candidates))
+    settings, chosen = (SETTING, SETTING), (0, 1, 6)
+    best, expected = density(space, data, chosen, settings), 0.0
+    for member, points in ((1, shapes[1]), (6, shapes[5])):
+        rest = tuple(c for c in chosen if c != member)
+        sets = [tuple(sorted((*rest, k))) for k in points]
+        expected += special.logsumexp([density(space, data, s, settings) for s in sets]) - best
+    assert expected > 0.0
+    assert space.over_shapes(chosen, settings) == pytest.approx(expected, abs=1e-8)
+    assert space.over_shapes((0,), settings) == 0.0
+
+
+def test_inertials_of_all_links_and_those_of_one_are_not_loose_at_once():
+    space, _ = planted(11, {})
+    free = np.full(1, np.inf)
+    loose = [Candidate(SILENT["inertials"], joints, np.zeros(0), np.array([k]), (0,), -free, free)
+             for k, joints in enumerate([(0,), (1,), (0, 1)])]  # fmt: skip
+    space = dataclasses.replace(space, candidates=(*space.candidates[:-3], *loose))
+    one, other, every = range(len(space.candidates) - 3, len(space.candidates))
+    assert space.conflicts((every,))[[one, other, every]].all()
+    assert space.conflicts((one,))[[one, every]].all() and not space.conflicts((one,))[other]
+    assert not space.conflicts((every,))[:one].any()  # beside any law
+
+
+def test_blocks_left_out_are_as_if_they_had_not_been_recorded():
+    space, _ = planted(9, {0: 1.0})
+    twice = [JointGram(g.index, np.concatenate([g.blocks, 3.0 * g.blocks]), g.groups, np.repeat(g.rows, 2))
+             for g in space.joints]  # fmt: skip
+    both = dataclasses.replace(space, joints=tuple(twice))
+    left = both.without(np.array([False, True]))
+    for one, other in zip(left.posterior((0,), (SETTING,) * 2), space.posterior((0,), (SETTING,) * 2), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)

@@ -11,6 +11,7 @@ from helpers_cli import refused
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import load_corrected, load_model, load_undecided, undecided
 from irb140_jax.mismatch.model import CorrectedModel
+from irb140_jax.mismatch.regression.discrepancy import FEATURES, Discrepancy
 
 
 @pytest.fixture(scope="module")
@@ -51,11 +52,18 @@ def with_value(value, *path):
     return spoil
 
 
+def unnamed(joints: int = 3, **sizes) -> dict:
+    """What a model carries without a name as JSON, some of the sizes replaced."""
+    scales = helpers_stored.open_questions().scales
+    data = Discrepancy(scales, np.zeros((joints, FEATURES))).to_json()
+    return data | {"scales": data["scales"] | sizes}
+
+
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (with_value(2, "schema"), "schema 2, this version reads and writes schema 1"),
-        (with_value("1", "schema"), "schema '1'"),
+        (with_value(1, "schema"), "schema 1, this version reads and writes schema 2"),
+        (with_value("2", "schema"), "schema '2'"),
         (without("schema"), "no schema"),
         (without("phi_refit"), "'phi_refit' is missing"),
         (without("robot", "leaves", "mass"), "mass"),
@@ -72,6 +80,11 @@ def with_value(value, *path):
         (with_value([5], "effects", 0, "variant"), "no columns (5,)"),
         (with_value(0, "band", "rate"), "band"),
         (with_value(1, "band", "unheard_of"), "unheard_of"),
+        (without("discrepancy"), "'discrepancy' is missing"),
+        (with_value(unnamed(joints=2), "discrepancy"), "discrepancy has shape (2, 78)"),
+        (with_value(unnamed() | {"scales": {}}, "discrepancy"), "missing"),
+        (with_value(unnamed(torque=[1.0, 2.0]), "discrepancy"), "torque has shape (2,)"),
+        (with_value(unnamed(torque=["nan", 1.0, 1.0]), "discrepancy"), "torque holds what is no number"),
     ],
 )
 def test_a_model_of_another_version_or_with_wrong_numbers_is_refused(spoil, said, folder):

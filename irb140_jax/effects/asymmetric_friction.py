@@ -23,7 +23,6 @@ class AsymmetricFriction(AbstractEffect):
         "coulomb_friction": "the same path in both directions, with pauses at the same posture",
     }
     needs = "motion in both directions"
-    feigned = 0.02  # errors of other laws are the same in both directions
     friction = True
     dissipative = True
     mjcf = "joint frictionloss for the mean of both directions, a constant spring torque for half their difference"

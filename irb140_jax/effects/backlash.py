@@ -41,7 +41,7 @@ class Backlash(AbstractEffect):
     )
     variants = ((0, 1),)
     own = (0,)
-    settled = 0.6  # true ones are 0.64 and more; half a gap of a few encoder noises takes that noise from the torque
+    settled = 0.6  # the shape holds the gap, so the amplitude is one but for the grid; less is another law's shadow
     confused_with = {
         "presliding_hysteresis": "reversals under several preloads",
         "joint_elasticity": "load reversals of several sizes: a gap is crossed whole, a spring bends with the load",
@@ -50,8 +50,6 @@ class Backlash(AbstractEffect):
         "actuator_lag": "slow reversals of the load",
     }
     needs = "a load on this joint that changes sign, both slowly and quickly"
-    feigned = 0.06  # so does a flank at every step of an imperfect friction law
-    coarse = 3.0  # a flank gives way by some law of its own, and smoothing spreads the jolt that the motor takes
     leans_on_inertials = True
     transmission = True
     history = "depends on where the link is in the gap, which is a state of its own"

@@ -45,10 +45,8 @@ class AbstractEffect(abc.ABC):
         variants: Subsets of the columns that make sense by themselves.
         confused_with: Slug of a look-alike -> the motion which separates the two.
         needs: The motion that would show the effect.
-        feigned: Share of a joint's friction torque that other, imperfect laws may put into this effect's columns; less
-            is no evidence for it.
-        coarse: How much more than others' its form errs, and feigns of them; 0 where it has no form that could.
-        ordinary: Nearly every machine has it: rarer laws must beat it clearly.
+        typical: Prior standard deviation of its torque, as a share of the joint's torque.
+        ordinary: Nearly every machine has it: its prior probability at a joint is one half.
         friction: It rubs inside the transmission, so it is no part of the load that the transmission carries.
         dissipative: It can only take energy out of the arm, at every instant.
         mjcf: How MJCF expresses it, all of it or a part (see `in_model`), or None.
@@ -65,8 +63,7 @@ class AbstractEffect(abc.ABC):
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
         tied: Its amplitudes are of one order of size: what the data can't see of one, the others bound.
         vector: Its amplitudes are components of one vector: what the data can't see of it may be larger than the rest.
-        alters: Slug of the law that it alters: it stands beside that, or one that contains it, or not at all.
-        silent: It competes with what was left out, and is not that: no finding bears its name.
+        silent: A candidate of the search that is no left-out physics: it is never reported as a finding.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         settled: Least amplitude of those once the grid of shapes is fine.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
@@ -83,8 +80,7 @@ class AbstractEffect(abc.ABC):
     variants: ClassVar[tuple[tuple[int, ...], ...]]
     confused_with: ClassVar[dict[str, str]] = {}
     needs: ClassVar[str]
-    feigned: ClassVar[float] = 0.03
-    coarse: ClassVar[float] = 1.0
+    typical: ClassVar[float] = 0.3
     ordinary: ClassVar[bool] = False
     friction: ClassVar[bool] = False
     dissipative: ClassVar[bool] = False
@@ -101,7 +97,6 @@ class AbstractEffect(abc.ABC):
     adds_up: ClassVar[bool] = False
     tied: ClassVar[bool] = False
     vector: ClassVar[bool] = False
-    alters: ClassVar[str | None] = None
     silent: ClassVar[bool] = False
     own: ClassVar[tuple[int, ...]] = (-1,)
     settled: ClassVar[float] = -np.inf

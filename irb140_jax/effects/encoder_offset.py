@@ -27,7 +27,6 @@ class EncoderOffset(AbstractEffect):
         "postures in which the derivative of the gravity torque by this joint's position changes sign, or a check of "
         "the zero mark"
     )
-    coarse = 0.0
     leans_on_inertials = True
     everywhere = True
     mjcf = "the joint's ref"

@@ -24,7 +24,6 @@ class GravityTilt(AbstractEffect):
         "encoder_offset": "a sweep of the first joint over its range",
     }
     needs = "a sweep of the first joint, in postures whose gravity torques are not all in proportion"
-    coarse = 0.0
     leans_on_inertials = True
     everywhere = True
     vector = True

@@ -33,7 +33,6 @@ class JointElasticity(AbstractEffect):
     }
     needs = "fast motion near the first resonance, or large gravity torques of both signs"
     leans_on_inertials = True
-    feigned = 0.06  # a spring rings at every step of an imperfect friction law
     transmission = True
     everywhere = True
     history = "depends on the motion of the link, which is a state of its own"

@@ -25,7 +25,6 @@ class NonlinearViscousFriction(AbstractEffect):
         "viscous_friction": "constant speeds over the whole speed range",
     }
     needs = "constant speeds over the whole speed range"
-    feigned = 0.05  # every lubricant bends a little: Coulomb and viscous friction fit real joints to some percent
     friction = True
     dissipative = True
     not_in_mjcf = "it is left out: joint damping is proportional to speed"

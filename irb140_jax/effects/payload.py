@@ -24,7 +24,6 @@ class Payload(AbstractEffect):
         "torque_gain": "the same motion with and without a known payload",
     }
     needs = "motion of the last link in several orientations, slow and fast"
-    coarse = 0.0
     mjcf = "the last link's inertial"
     everywhere = True
     not_in_mjcf = ""

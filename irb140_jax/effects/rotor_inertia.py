@@ -21,7 +21,6 @@ class RotorInertia(AbstractEffect):
         "actuator_lag": "reversals at several accelerations: a lag shifts the step of friction in time",
     }
     needs = "high acceleration of the joint while the joints before it move too"
-    coarse = 0.0
     transmission = True
     mjcf = "joint armature"
     not_in_mjcf = ""

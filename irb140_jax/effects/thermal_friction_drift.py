@@ -8,6 +8,8 @@ from irb140_jax.effects.grids import geometric_grid
 from irb140_jax.effects.motion import of_site
 from irb140_jax.effects.native import with_joint
 
+FASTEST = 10.0  # s: no gear warms faster; what settles sooner is something else
+
 
 class ThermalFrictionDrift(AbstractEffect):
     """tau = Fv (1 - drop (1 - exp(-t/T))) qd, t since the recording began, cold."""
@@ -35,7 +37,7 @@ class ThermalFrictionDrift(AbstractEffect):
 
     def shapes(self, scales, joints):
         duration = max(scales.duration, 1.0)
-        return geometric_grid(0.05 * duration, 2.0 * duration, 6)
+        return geometric_grid(max(0.05 * duration, FASTEST), max(2.0 * duration, 2.0 * FASTEST), 6)
 
     def refines(self):
         return True

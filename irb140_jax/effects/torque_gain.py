@@ -6,7 +6,7 @@ from irb140_jax.effects.base import AbstractEffect, Parameter
 from irb140_jax.effects.motion import of_site
 from irb140_jax.effects.native import with_gear
 
-LARGEST = 1.5  # torque constants are known better than that; a model's torque full of noise feigns larger gains
+LARGEST = 3.0  # beyond, a column holds another unit or another side of the gear
 
 
 class TorqueGain(AbstractEffect):
@@ -16,7 +16,7 @@ class TorqueGain(AbstractEffect):
     title = "a wrong torque constant"
     equation = "(1/gain - 1) tau_model"
     source = "Gautier and Briot, Global identification of joint drive gains, JMR 6(2), 2014"
-    parameters = (Parameter("gain", "1", low=1 / 1.5, high=1.5),)
+    parameters = (Parameter("gain", "1", low=1 / LARGEST, high=LARGEST),)
     variants = ((0,),)
     confused_with = {
         "payload": "the same motion with and without a known payload",
@@ -24,6 +24,7 @@ class TorqueGain(AbstractEffect):
         "load_dependent_friction": "the same loads at rest",
     }
     logged = 1
+    typical = 0.1  # what torque constants are known to
     needs = "large gravity torque on this joint and on others with the same links, or a known payload"
     mjcf = "the gear of the actuator"
     not_in_mjcf = ""

@@ -22,7 +22,6 @@ class TorqueOffset(AbstractEffect):
         "gravity_spring": "the whole range of the joint",
         "asymmetric_friction": "dwells: an offset stays at rest, friction does not",
     }
-    coarse = 0.0
     transmission = True
     needs = "postures with clearly different gravity torque"
     mjcf = "joint stiffness and springref: a very soft spring with a large deflection"

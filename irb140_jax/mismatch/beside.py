@@ -25,25 +25,15 @@ class Beside:
     def conflicts(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Candidates that can't stand beside a set, shape (candidates,).
 
-        They are the effect itself, what absorbs it or is absorbed, and what alters a law that is not there.
+        They are the effect itself, and what absorbs it or is absorbed.
         """
         kinds = self._kind[list(chosen)]
-        return (self._excludes[kinds].any(axis=0) | (self._alters & ~self._carries[kinds].any(axis=0)))[self._kind]
+        return np.any(self._excludes[kinds], axis=0)[self._kind]
 
     @cached_property
     def _excludes(self) -> np.ndarray:
         """Whether one rules out another at its site, shape (kinds, kinds)."""
         return self._table(lambda a, b: a.slug == b.slug or b.slug in _absorbed(a) or a.slug in _absorbed(b))
-
-    @cached_property
-    def _alters(self) -> np.ndarray:
-        """Which are nothing without a law that they alter, shape (kinds,)."""
-        return np.array([c.effect.alters is not None for c in self._kinds], dtype=bool)
-
-    @cached_property
-    def _carries(self) -> np.ndarray:
-        """Whether one is, or contains, the law that another alters at its site, shape (kinds, kinds)."""
-        return self._table(lambda a, b: b.effect.alters in {a.slug, *a.effect.contains})
 
     def _table(self, holds: Callable[[Candidate, Candidate], bool]) -> np.ndarray:
         table = np.zeros((len(self._kinds), len(self._kinds)), dtype=bool)

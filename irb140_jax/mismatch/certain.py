@@ -3,7 +3,6 @@
 import numpy as np
 
 from irb140_jax.mismatch.explanation import Explanation
-from irb140_jax.mismatch.prove import held_out_gain
 from irb140_jax.robot import Robot
 
 MOST_OF = 0.05  # of the finding's power: joints with less of it are not listed
@@ -11,7 +10,7 @@ MOVING = 0.9  # |direction of motion| from which a row counts as one way or the 
 TWO_WAYS = ("torque_offset",)  # beside friction: what is a level of torque while the joint moves
 
 
-def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray) -> str:
+def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray, gain: float) -> str:
     """One sentence with numbers that every explanation in a finding's place must agree with.
 
     The torque that the finding stands for, at its joints, and what it is worth on unseen data; of friction and offsets
@@ -23,6 +22,7 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
         index: The finding.
         w: Its amplitudes, shape (k,).
         cov: Their covariance, shape (k, k).
+        gain: Share of the squared error on unseen data that it removes.
     """
     c = ex.data.candidates[index]
     columns = ex.data.nuisances + c.columns
@@ -39,9 +39,8 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
         "what is logged there)"
         for j in listed
     ]
-    gain = float(np.clip(held_out_gain(ex, index)[0], 0.0, 0.9999))
     said = f"Beyond what rigid bodies explain, the torque needs {_listed(sizes)}"
-    said += f"; it removes {_percent(gain)} of the squared error on unseen data"
+    said += f"; it removes {_percent(float(np.clip(gain, 0.0, 0.9999)))} of the squared error on unseen data"
     if len(c.joints) == 1 and (c.effect.friction or c.slug in TWO_WAYS):
         said += _two_ways(robot, ex, c.joints[0], columns, w, cov)
     return said + "."

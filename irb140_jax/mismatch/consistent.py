@@ -2,6 +2,7 @@
 
 import numpy as np
 
+ROUNDING = 1e-9  # of a pseudo-inertia's largest eigenvalue
 LEAST = 1e-3  # of the nominal mass, along any of its directions: a link thinner than that is rounding
 
 
@@ -29,8 +30,14 @@ def consistent(phi: np.ndarray, nominal: np.ndarray) -> np.ndarray:
         values, vectors = np.linalg.eigh(inverse @ pseudo_inertia(new) @ inverse.T)
         if values.min() < LEAST:
             root = L @ vectors
-            out[i] = _parameters(root @ np.diag(np.maximum(values, LEAST)) @ root.T)
+            out[i] = parameters(root @ np.diag(np.maximum(values, LEAST)) @ root.T)
     return out
+
+
+def is_body(phi: np.ndarray) -> bool:
+    """Whether inertial parameters (10,) are those of a body with mass along every direction, beyond rounding."""
+    values = np.linalg.eigvalsh(pseudo_inertia(phi))
+    return bool(values[0] > ROUNDING * values[-1])
 
 
 def pseudo_inertia(phi: np.ndarray) -> np.ndarray:
@@ -45,7 +52,7 @@ def pseudo_inertia(phi: np.ndarray) -> np.ndarray:
     return J
 
 
-def _parameters(J: np.ndarray) -> np.ndarray:
+def parameters(J: np.ndarray) -> np.ndarray:
     """The inverse of `pseudo_inertia`."""
     inertia = np.trace(J[:3, :3]) * np.eye(3) - J[:3, :3]
     return np.concatenate([[J[3, 3]], J[:3, 3], inertia[np.triu_indices(3)]])

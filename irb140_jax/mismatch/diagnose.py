@@ -23,13 +23,16 @@ from irb140_jax.mismatch.enough import (
     usable_rows,
 )
 from irb140_jax.mismatch.explain import explain
-from irb140_jax.mismatch.explanation import Explanation, explained_by, fitted, full_posterior
-from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding
-from irb140_jax.mismatch.model import CorrectedModel, Named
+from irb140_jax.mismatch.explanation import Explanation, fitted
+from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding, torque_scale_odds
+from irb140_jax.mismatch.model import CorrectedModel, Named, scaled, torques_along
 from irb140_jax.mismatch.native import native_gap
-from irb140_jax.mismatch.notes import gap_notes, notes
-from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, lasting, refitted, transferring
+from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, notes, skew_notes
+from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, refitted
 from irb140_jax.mismatch.provenance import provenance
+from irb140_jax.mismatch.regression.discrepancy import Discrepancy
+from irb140_jax.mismatch.regression.nuisances import feature_coefficients
+from irb140_jax.mismatch.selection.selected import NAMED
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
@@ -55,15 +58,12 @@ class DiagnoseConfig:
         words: What the command line said beside the recordings and the uncertainty, to be kept in the diagnosis:
             `--robot arm.xml`.
         known_joints: Every joint of the model's file, where the robot is a part of it; see `CorrectedModel`.
-        discrepancy: Whether laws may be wrong by a function of the state, and logs by the instrument: the second
-            engine, which is being compared with the first.
     """
 
     inertial_uncertainty: float = 0.05
     effects: tuple[AbstractEffect, ...] = tuple(CATALOGUE.values())
     words: tuple[str, ...] = ()
     known_joints: tuple[str, ...] = ()
-    discrepancy: bool = False
 
     @property
     def options(self) -> dict[str, Any]:
@@ -125,32 +125,31 @@ def _diagnosed(
     band, recordings, smooth, again = comparable(robot, recordings)
     if reason := too_little(smooth, band):
         return _nothing_compared(robot, recordings, smooth, band, config, reason, [*twice, *again])
-    ex = explain(
-        robot, smooth, band, config.effects, config.inertial_uncertainty, progress, discrepancy=config.discrepancy
-    )
+    parts = scatter_by_sensor(robot, recordings, smooth, band)
+    scatter = np.hypot(*parts)
+    ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, scatter, progress)
+    ex = dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= NAMED)
     progress("proving on data that the fit did not see")
-    ex = ex if config.discrepancy else lasting(transferring(ex))
-    refit, proof, rest = _proved(ex, progress)
-    doubtful = set() if config.discrepancy else {c for u in rest for c in u.doubtful}
-    if doubtful:  # names that only stand in for what has none
-        ex = explained_by(ex, tuple(c for c in ex.chosen if c not in doubtful))
-        refit, proof, rest = _proved(ex, progress)
+    refit = refitted(ex)
+    proof = held_out(ex, refit)
+    progress("looking for structure that no effect explains")
+    rest = unexplained(ex, proof)
     found = findings(robot, ex)
-    model = _model(robot, ex, refit, band, config.known_joints or robot.joint_names)
-    w = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen).mean * ex.data.scale[ex.columns()]
+    model = _model(robot, ex, refit, proof, band, config.known_joints or robot.joint_names)
     logged = [s.tau for s in ex.data.stretches]
-    corrected = [s.tau - s.y + s.X[..., ex.columns()] @ w for s in ex.data.stretches]
+    laws = dataclasses.replace(model, discrepancy=None)  # which the file can't hold, as a note of its own says
+    corrected = [band.apply(torques_along(laws, r).corrected) for r in smooth]
     lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
     gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)
     seen = visibility(ex, matters)
     usual = notes(robot, smooth, band, config.inertial_uncertainty, usable_rows(smooth, band), proof.judged)
     origin = provenance(robot, recordings, config.options, config.words)
-    parts = scatter_by_sensor(robot, recordings, smooth, band)
-    scatter = np.hypot(*parts)
     missing = undecidable(robot, proof, logged, scatter, band)
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
-    said = [*open_joints, *coarse_positions(robot, *parts, proof.judged), *twice, *again, *usual, *gap]
+    unnamed = [*friction_notes(ex, [r.source for r in smooth]), *skew_notes(ex), *discrepancy_notes(robot, proof)]
+    coarse = coarse_positions(robot, *parts, proof.judged)
+    said = [*open_joints, *unnamed, *coarse, *twice, *again, *usual, *gap]
     every = [*found, *torque_scale_finding(robot, ex)]
     diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
@@ -206,23 +205,21 @@ def _finite(recording: Recording) -> Recording:
     return recording
 
 
-def _proved(ex: Explanation, progress: Callable[[str], None]) -> tuple[Refit, HeldOut, list[Unexplained]]:
-    """The refit beside an explanation, both on data that they did not see, and what is left without a name."""
-    refit = refitted(ex)
-    proof = held_out(ex, refit)
-    progress("looking for structure that no effect explains")
-    return refit, proof, unexplained(ex, proof)
-
-
-def _model(robot: Robot, ex: Explanation, refit: Refit, band: Band, known: tuple[str, ...]) -> CorrectedModel:
-    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
-    refitted_shift, _, _ = fitted(ex.data, refit.posterior(), loose, ex.factor)
-    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+def _model(
+    robot: Robot, ex: Explanation, refit: Refit, proof: HeldOut, band: Band, known: tuple[str, ...]
+) -> CorrectedModel:
+    refitted_shift, _, _ = fitted(ex.data, refit.posterior(), refit.loose, ex.factor)
+    post, scale, own = ex.prediction()
     dphi, members, amplitudes = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)
-    named = tuple(Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True))
+    named = [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
     phi_refit, phi_corrected = (phi + shift.reshape(phi.shape) for shift in (refitted_shift, dphi))
-    return CorrectedModel(robot, phi_refit, phi_corrected, named, band, ex.scales.rest_speed, known)
+    discrepancy = None
+    if proof.carried.any():
+        discrepancy = Discrepancy(ex.scales, feature_coefficients(ex.extra[0], own, proof.carried))
+    return CorrectedModel(
+        robot, phi_refit, phi_corrected, scaled(robot.n, named, scale), band, ex.scales.rest_speed, known, discrepancy
+    )
 
 
 def _document(

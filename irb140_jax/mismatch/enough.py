@@ -11,7 +11,6 @@ from irb140_jax import dynamics
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.mismatch.along import prepared, scales_of
 from irb140_jax.mismatch.assemble import FEWEST_ROWS as FEWEST_OF_A_JOINT
-from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate, library
 from irb140_jax.mismatch.noise import ORDER
 from irb140_jax.mismatch.prove import HeldOut
@@ -106,7 +105,8 @@ def all_open(
     middle = [alike[len(alike) // 2] for alike in shapes.values()]
     columns = tuple(Column(c.slug, c.joints, tuple(map(float, c.shape)), c.variant) for c in middle)
     amplitudes = np.concatenate([c.columns for c in middle])
-    scale = TYPICAL_SHARE / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
+    typical = np.concatenate([np.full(len(c.columns), c.effect.typical) for c in middle])
+    scale = typical / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
     size = 10 * robot.n + len(amplitudes) + 1
     white = np.tile(np.eye(1, ORDER + 1), (robot.n, 1))
     questions = Undecided(
@@ -168,7 +168,7 @@ _masses = eqx.filter_jit(jax.vmap(dynamics.mass_matrix, in_axes=(None, 0)))
 
 def torque_size(proof: HeldOut, torque: Sequence[np.ndarray]) -> np.ndarray:
     """Standard deviation of each joint's low-passed torque over the rows that count, shape (n,)."""
-    out = np.zeros(len(proof.floor))
+    out = np.zeros(len(proof.carried))
     for j in range(len(out)):
         values = np.concatenate([x[u[:, j], j] for x, u in zip(torque, proof.use, strict=True)])
         out[j] = np.std(values) if len(values) else 0.0

@@ -113,24 +113,6 @@ def root(M: np.ndarray) -> np.ndarray:
         return (R * np.sign(np.diag(R))[:, None]).T
 
 
-def log_determinants(M: np.ndarray) -> np.ndarray:
-    """Log determinants of matrices (count, k, k) that are at least the unit prior.
-
-    Those that rounding took below it are raised to it, in place.
-    """
-    if M.shape[-1] == 1:
-        np.maximum(M, 1.0, out=M)
-        return np.log(M[:, 0, 0])
-    sign, logdet = np.linalg.slogdet(M)
-    short = (sign <= 0.0) | (logdet < 0.0)
-    if short.any():
-        values, vectors = np.linalg.eigh(M[short])
-        values = np.maximum(values, 1.0)
-        M[short] = (vectors * values[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-        logdet[short] = np.log(values).sum(axis=1)
-    return logdet
-
-
 def eliminated(H: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
     """Gram matrix after marginalising some columns (unit prior), and the log determinant that this costs."""
     if len(columns) == 0:
@@ -192,53 +174,6 @@ def layouts(candidates: Sequence[Candidate], offset: int) -> tuple[Layout, ...]:
         which = np.flatnonzero(sizes == k)
         out.append(Layout(which, np.stack([candidates[int(i)].columns for i in which]) + offset))
     return tuple(out)
-
-
-def half_of(H: np.ndarray, columns: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """What marginalising some columns takes off others, as `half.T @ half`.
-
-    Args:
-        H: Gram matrix of whitened columns in prior units, without units themselves, shape (K, K).
-        columns: Which to marginalise, each with a standard normal prior.
-        index: The others that are asked for.
-
-    Returns:
-        The half, shape (len(columns), len(index)).
-    """
-    chol = root(with_prior(H[np.ix_(columns, columns)]))
-    return linalg.solve_triangular(chol, H[np.ix_(columns, index)], lower=True, check_finite=False)
-
-
-def gains(
-    H: np.ndarray, groups: Sequence[Layout], count: int, width: int, half: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Log evidence that each candidate adds, and the amplitudes it would get.
-
-    Args:
-        H: Gram matrix with everything else eliminated, or with all but a set.
-        groups: Candidates to try, from `layouts`.
-        count: Number of all candidates.
-        width: Largest number of amplitudes.
-        half: What eliminating that set takes off, from `half_of`.  Only each candidate's own columns are worked out:
-            the whole matrix would be most of the time that a search takes.
-
-    Returns:
-        Gains, shape (count,), -inf for those not tried; amplitudes in prior units, padded with NaN, (count, width).
-    """
-    gain, mean = np.full(count, -np.inf), np.full((count, width), np.nan)
-    for group in groups:
-        index, k = group.columns, group.columns.shape[1]
-        M = with_prior(H[index[:, :, None], index[:, None, :]])
-        b = H[index, -1]
-        if half is not None:
-            part = half[:, index]
-            M = M - np.einsum("cik,cil->ikl", part, part)
-            b = b - np.einsum("cik,c->ik", part, half[:, -1])
-        logdet = log_determinants(M)
-        v = np.linalg.solve(M, b[..., None])[..., 0] if k > 1 else b / M[:, 0]
-        gain[group.which] = 0.5 * np.einsum("ik,ik->i", b, v) - 0.5 * logdet
-        mean[group.which, :k] = v
-    return gain, mean
 
 
 def gain_of(H: np.ndarray, columns: np.ndarray) -> float:

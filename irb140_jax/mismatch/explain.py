@@ -5,37 +5,28 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect, Scales
+from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
-from irb140_jax.mismatch.assemble import BLOCKS, Data, assemble, first_noise, problem
+from irb140_jax.mismatch.assemble import BLOCKS, assemble
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
-from irb140_jax.mismatch.explanation import (
-    Explanation,
-    explained_by,
-    fitted,
-    full_posterior,
-    noise_under,
-    parts,
-)
-from irb140_jax.mismatch.model import Named, better_known, composed
-from irb140_jax.mismatch.name import guessed, search
+from irb140_jax.mismatch.explanation import Explanation, fitted
+from irb140_jax.mismatch.model import Named, Torques, better_known, composed
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.nuisances import nuisances
 from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
-from irb140_jax.mismatch.selection.selected import selected
-from irb140_jax.mismatch.silent import SoftFriction
+from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
+from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.mismatch.tangent import Point, point
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
-WEIGHTLESS = 0.43  # standard deviations of a payload's mass: with less, the odds that there is any are below two to one
 PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both ...
 MOST_PASSES = 5  # ... unless a shape is known far better than its grid is fine:
-COARSE = 100.0  # its best point stands alone by so much in log odds, and a law that is a little off leaves as much
+COARSE = 100.0  # nats by which its best point exceeds all others in some direction; a slightly wrong shape costs that
 
 
 def explain(
@@ -44,9 +35,8 @@ def explain(
     band: Band,
     effects: Sequence[AbstractEffect],
     uncertainty: float,
+    sensors: np.ndarray,
     progress: Callable[[str], None] = lambda _: None,
-    *,
-    discrepancy: bool = False,
 ) -> Explanation:
     """Search for what the model leaves out.
 
@@ -56,14 +46,14 @@ def explain(
         band: Of the comparison.
         effects: The library.
         uncertainty: Relative standard deviation of the inertials.
+        sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         progress: Told what is being done.
-        discrepancy: Whether laws may be wrong (see `regression.discrepancy`).
     """
-    factor, effects = inertial_prior_factor(robot, 1.0), (*effects, SoftFriction())
+    factor = inertial_prior_factor(robot, 1.0)
     progress("rigid body along the recordings")
     along = [prepared(robot, r) for r in recordings]
     scales = scales_of(along)
-    lib = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
+    lib = first = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     loads: list[Loads | None] = [None] * len(recordings)
     at: Point | None = None
     chosen: tuple[int, ...] = ()
@@ -72,7 +62,7 @@ def explain(
     def explained(turn: int, blocks: int) -> Explanation:
         ex = explained_at(at, turn, blocks)
         if at and not at.rests_on <= {(m.slug, m.joints) for m in ex.members}:
-            # Under leaning gravity that nothing is named for, inertials can feign the tilt.
+            # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
             del ex
             return explained_at(None, turn, blocks)
         return ex
@@ -85,98 +75,96 @@ def explain(
             return explained_at(None, turn, blocks)  # an explanation without bounds is nothing to start from
         data = assemble(lib, rows, uncertainty)
         progress(f"searching sets of explanations (round {turn})")
-        if discrepancy:
-            both = zip(along, loads, strict=True)
-            known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in both]
-            found = selected(data, nuisances(robot, along, known, band, scales), chosen)
-            prob, g = problem(data, found.noise, blocks, settled=turn > 1)
-            return Explanation(lib, scales, data, found.noise, found.chosen, prob, g, found.chosen, factor, found)
-        return _settled(lib, scales, data, factor, chosen, noise, blocks, settled=turn > 1)
+        known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in zip(along, loads, strict=True)]
+        extra = nuisances(robot, along, known, band, scales)
+        whitening = noise or flexible_noise(data, extra)
+        space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1)
+        best, settings, sets = selected(space, chosen)
+        return Explanation(lib, scales, data, extra, whitening, space, best, settings, sets, factor)
 
-    turn, coarse = 1, False
-    while turn < PASSES or (coarse and turn < MOST_PASSES):
+    turn, coarse, off = 1, False, False
+    while turn < PASSES or ((coarse or off) and turn < MOST_PASSES):
         ex = explained(turn, blocks=1)
-        found = fitted(ex.data, full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), ex.chosen, factor)
-        named = _named(found)
-        better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), named)
-        along, at = [seen_by(better, r) for r in along], point(robot, found[0], named)
-        loads = [_loads(lib, found, r, i) for i, r in enumerate(along)]
-        (lib, chosen), noise, coarse = _refined(ex), ex.noise, _coarse(ex)
+        found = fitted(ex.data, ex.posterior(), ex.chosen, factor)
+        physics = _physics(found)
+        better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
+        along, at = [seen_by(better, r) for r in along], point(robot, found[0], physics)
+        torques = [_torques(lib, found, r, i) for i, r in enumerate(along)]
+        loads = [t.loads for t in torques]
+        off = _off(ex, torques, band)
+        noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
+        # A first grid is too coarse for any law to be right: with a discrepancy all its points are equally good.
+        coarse = _coarse(ex)
+        lib, chosen = _refined(ex if turn > 1 else _without_discrepancy(ex))
         turn += 1
         del ex  # hundreds of megabytes, before the next
-    if discrepancy:
-        return explained(turn, BLOCKS)
-    ex = _of_some_weight(explained(turn, BLOCKS))
-    # The last search may have found another set than that whose noise it was weighted by.
-    return explained_by(ex, ex.chosen)
+    ex = explained(turn, BLOCKS)
+    sure, settings = named(ex.space, ex.chosen, ex.settings, ex.sets)
+    return dataclasses.replace(ex, chosen=sure, settings=settings)
 
 
-def _settled(
-    lib: Library, scales: Scales, data: Data, factor: np.ndarray, chosen: tuple[int, ...], noise: Noise | None,
-    blocks: int, *, settled: bool,
-) -> Explanation:  # fmt: skip
-    """Search and noise in turn: noise that the last explanation left may hide an effect that it named wrongly."""
-    # The noise of the round before is nearly right; the first is a guess, under which a full search would take minutes
-    # where there is much structure without a name.
-    rounds = (search,) if noise else (guessed, search)
-    noise = noise or first_noise(data)
-    for find in rounds:
-        prob, g = problem(data, noise, blocks=1, settled=settled)
-        chosen = find(prob, chosen)
-        noise = noise_under(data, prob, chosen, noise, rounds=1)
-        del prob, g  # hundreds of megabytes, before the next are made
-    prob, g = problem(data, noise, blocks, settled=settled)
-    return Explanation(lib, scales, data, noise, chosen, prob, g, search(prob, chosen), factor)
-
-
-def _of_some_weight(ex: Explanation) -> Explanation:
-    """The explanation without what should have a mass and has none, and with what is then found: see `WEIGHTLESS`."""
-    post, weightless = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen), set()
-    for c, part in zip(ex.members, parts(ex.data, ex.chosen), strict=True):
-        mass = part.start
-        if c.effect.tied and post.mean[mass] < WEIGHTLESS * np.sqrt(post.cov[mass, mass]):
-            weightless.add((c.slug, c.joints))
-    if not weightless:
-        return ex
-    none = np.array([(c.slug, c.joints) in weightless for c in ex.data.candidates])
-    prob = dataclasses.replace(ex.problem, lowest=np.where(none[:, None], np.inf, ex.problem.lowest))
-    return dataclasses.replace(ex, problem=prob, chosen=search(prob, tuple(i for i in ex.chosen if not none[i])))
-
-
-def _named(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
+def _physics(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
     """The effects of an explanation (see `fitted`) with their numbers."""
     _, members, amplitudes = found
     return [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
 
 
-def _loads(lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]], r: Prepared, index: int) -> Loads:
-    """Loads of an explanation (see `fitted`) along a recording."""
+def _torques(
+    lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]], r: Prepared, index: int
+) -> Torques:
+    """Torques of an explanation (see `fitted`) along a recording."""
     dphi, members, amplitudes = found
-    return composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi).loads
+    return composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi)
+
+
+def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
+    """Whether an explanation is another than its linearisation by more than noise at some joint: it has to be repeated.
+
+    Args:
+        ex: The explanation, linear in what is unknown.
+        torques: What its numbers give along the recordings, products of unknowns included.
+        band: Of the comparison.
+    """
+    post = ex.posterior()
+    w = post.mean * ex.data.scale[post.columns]
+    square = np.zeros(len(ex.settings))
+    for s, t in zip(ex.data.stretches, torques, strict=True):
+        linear = s.tau - s.y + s.X[..., post.columns] @ w
+        square += np.sum(np.where(s.use, band.apply(t.corrected) - linear, 0.0) ** 2, axis=0)
+    rows = np.maximum(sum(s.use.sum(axis=0) for s in ex.data.stretches), 1)
+    return bool(np.any(np.sqrt(square / rows) > ex.level))
+
+
+def _without_discrepancy(ex: Explanation) -> Explanation:
+    """The explanation as if its laws were exact."""
+    return dataclasses.replace(ex, settings=tuple((*(0 for _ in s[:-1]), s[-1]) for s in ex.settings))
 
 
 def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
-    """Finer grids of shapes around the chosen ones, and grids that the residual suggests."""
+    """Finer grids of shapes around the best ones, grids that the residual suggests, the set with the best shapes."""
     left = left_over(ex.data, ex.columns(), ex.noise.total)
-    shapes = []
+    shapes, best = [], {i: ex.data.candidates[i].shape for i in ex.chosen}
     for effect, sites, old, _ in ex.lib.blocks:
         new = old.copy()
         for s, joints in enumerate(sites):
-            mine = [m for m in ex.members if m.slug == effect.slug and m.joints == tuple(joints)]
+            mine = [i for i in best if (ex.data.candidates[i].slug, ex.data.candidates[i].joints)
+                    == (effect.slug, tuple(joints))]  # fmt: skip
             if mine and effect.refines():
-                new[s] = effect.finer(old[s], _peak(ex, mine[0]))
+                best[mine[0]], peak = _peak(ex, mine[0])
+                new[s] = effect.finer(old[s], peak)
             elif effect.scouts and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)
     refined = reshaped(ex.lib, shapes)
-    return refined, tuple(_same(c, refined, ex.data) for c in ex.chosen)
+    return refined, tuple(_same(ex.data.candidates[i], shape, i, refined) for i, shape in best.items())
 
 
 def _coarse(ex: Explanation) -> bool:
     """Whether the shape of a member is known so well that in some direction its grid has no other point that can be."""
-    for mine in ex.members:
+    for index in ex.chosen:
+        mine = ex.data.candidates[index]
         if mine.effect.refines():
-            grid, odds = _grid_of(ex, mine)
+            grid, odds = _grid_of(ex, index)
             best = odds[np.argmin(np.abs(grid - mine.shape).sum(axis=1))]
             for points in nearest_in_each_direction(grid, mine.shape):
                 beside = np.sort(odds[points][np.isfinite(odds[points])])[-2:]  # the best may be midway between two
@@ -185,28 +173,26 @@ def _coarse(ex: Explanation) -> bool:
     return False
 
 
-def _peak(ex: Explanation, mine: Candidate) -> np.ndarray:
-    """Where a member's grid is at its best beside the other members, to a fraction of its steps."""
-    grid, odds = _grid_of(ex, mine)
-    return mine.effect.peak(grid, mine.shape, odds)
+def _peak(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """The best point of a member's grid, and where the grid is at its best to a fraction of its steps."""
+    mine = ex.data.candidates[index]
+    grid, odds = _grid_of(ex, index)
+    best = grid[np.argmax(odds)] if np.isfinite(odds).any() else mine.shape
+    return best, mine.effect.peak(grid, best, odds)
 
 
-def _grid_of(ex: Explanation, mine: Candidate) -> tuple[np.ndarray, np.ndarray]:
+def _grid_of(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
     """A member's grid, shape (points, shape parameters), and log odds of its points beside the other members."""
-    candidates, site = ex.data.candidates, (mine.slug, mine.joints, mine.variant)
+    candidates, mine = ex.data.candidates, ex.data.candidates[index]
+    site = (mine.slug, mine.joints, mine.variant)
     same = [i for i, c in enumerate(candidates) if (c.slug, c.joints, c.variant) == site]
-    odds = ex.problem.scores(tuple(c for c in ex.chosen if c not in same))[same]
-    return np.array([candidates[i].shape for i in same]), odds
+    return np.array([candidates[i].shape for i in same]), ex.gains(ex.others(index), same)
 
 
-def _same(index: int, lib: Library, data: Data) -> int:
-    """The candidate nearest in shape to one of the library before; loose inertials keep their place at the end."""
-    old = data.candidates[index]
-    if old.slug == "inertials":
+def _same(c: Candidate, shape: np.ndarray, index: int, lib: Library) -> int:
+    """The candidate of a library nearest to a shape of one before; loose inertials keep their place at the end."""
+    if c.slug == "inertials":
         return index
-    alike = [
-        (float(np.sum(np.abs(c.shape - old.shape))), i)
-        for i, c in enumerate(lib.candidates)
-        if c.slug == old.slug and c.joints == old.joints and c.variant == old.variant
-    ]
-    return min(alike)[1]
+    site = (c.slug, c.joints, c.variant)
+    alike = [i for i, o in enumerate(lib.candidates) if (o.slug, o.joints, o.variant) == site]
+    return min(alike, key=lambda i: float(np.sum(np.abs(lib.candidates[i].shape - shape))))

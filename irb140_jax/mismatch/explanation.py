@@ -1,19 +1,20 @@
-"""A set of candidates beside the rigid body: what it is in the data, and what it leaves as noise."""
+"""A set of candidates beside the rigid body: what it is in the data, and how probable it and its members are."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 from irb140_jax.effects import Scales
-from irb140_jax.mismatch.assemble import Data, problem
+from irb140_jax.mismatch.assemble import Data
+from irb140_jax.mismatch.bodies import of_bodies
 from irb140_jax.mismatch.candidates import Candidate, Library
-from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
-from irb140_jax.mismatch.noise import Noise, noise_from_residuals
-from irb140_jax.mismatch.problem import Problem
-from irb140_jax.mismatch.rows import Stretch
-from irb140_jax.mismatch.selection.selected import Selected
-
-SETTLED = 2  # rounds in which the noise and what leaves it agree
+from irb140_jax.mismatch.evidence import Posterior
+from irb140_jax.mismatch.noise import Noise
+from irb140_jax.mismatch.regression.gram import LEVELS
+from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON, Nuisances
+from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities
+from irb140_jax.mismatch.selection.evidence import Settings, Space
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,42 +25,132 @@ class Explanation:
         lib: The library in its last state: refined shapes.
         scales: Sizes of the recordings.
         data: Low-passed rows.
-        noise: Whitening under the explanation.
-        noise_of: Indices of the candidates that leave this noise.
-        problem: Search problem.
-        grams: Gram matrices by block.
-        chosen: Indices of the candidates in the explanation.
+        extra: Nuisance columns and the discrepancy's, one per recording.
+        noise: What whitens the rows.
+        space: Gram matrices and priors.
+        chosen: Indices of the candidates that are named.
+        settings: Sizes of the discrepancy and noise levels of each joint beside them.
+        sets: Log posterior of every set that the search visited.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
-        selected: What a search with model discrepancy found, where there was one.
+        scaled: Whether one scale of all logged torques is a finding.
     """
 
     lib: Library
     scales: Scales
     data: Data
+    extra: list[Nuisances]
     noise: Noise
-    noise_of: tuple[int, ...]
-    problem: Problem
-    grams: Grams
+    space: Space
     chosen: tuple[int, ...]
+    settings: Settings
+    sets: Sets
     factor: np.ndarray
-    selected: Selected | None = None
+    scaled: bool = False
 
     @property
-    def members(self) -> list:
+    def members(self) -> list[Candidate]:
         """The chosen candidates."""
         return [self.data.candidates[c] for c in self.chosen]
 
+    @property
+    def level(self) -> np.ndarray:
+        """Standard deviation of the noise that is left at each joint, shape (n,) [N m or N]."""
+        return np.sqrt(np.mean(self.noise.total**2, axis=0)) * [LEVELS[s[-1]] for s in self.settings]
+
     def columns(self, chosen: tuple[int, ...] | None = None) -> np.ndarray:
-        """Columns of the full model: inertials, then the amplitudes of the chosen candidates."""
+        """Columns of the data that a set uses: inertials, then the amplitudes of its candidates."""
         chosen = self.chosen if chosen is None else chosen
-        return np.concatenate([np.arange(self.data.nuisances), self.problem.columns(chosen)])
+        own = [self.data.nuisances + self.data.candidates[c].columns for c in chosen]
+        return np.concatenate([np.arange(self.data.nuisances), *own])
 
+    def others(self, index: int) -> tuple[int, ...]:
+        """The chosen candidates but one."""
+        return tuple(c for c in self.chosen if c != index)
 
-def estimate(ex: Explanation) -> Posterior:
-    """Posterior of inertials and chosen amplitudes, with the model discrepancy integrated out where there is one."""
-    if ex.selected and ex.selected.chosen == ex.chosen:
-        return ex.selected.posterior()
-    return full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    def log_posterior(self, chosen: Sequence[int], joints: Sequence[int] | None = None) -> float:
+        """Log posterior of a set, sizes and levels fitted to it anew, at some joints or all."""
+        key = frozenset(chosen)
+        known = self.sets.get(key)
+        return self.space.settled(tuple(sorted(key)), self.settings, joints)[0] if known is None else known
+
+    def gains(self, chosen: tuple[int, ...], which: Sequence[int]) -> np.ndarray:
+        """Log posterior odds of adding each of some candidates to a set, -inf where inadmissible."""
+        return self.space.gains(chosen, self.settings, np.asarray(which, dtype=int))
+
+    def near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
+        """Gram matrix of some amplitudes' columns and y; inertials, nuisances and a set's amplitudes integrated out.
+
+        Args:
+            chosen: The set.
+            columns: Columns of amplitudes, numbered from the first amplitude.
+        """
+        return self.space.near(chosen, self.settings, columns + self.space.offset)
+
+    def posterior(
+        self, chosen: tuple[int, ...] | None = None, without: np.ndarray | None = None, *, instrument: bool = True
+    ) -> Posterior:
+        """Inertials and amplitudes in prior units, with discrepancy and nuisance parameters integrated out.
+
+        Args:
+            chosen: Which candidates, by default those that are named.
+            without: Which blocks of the data are left out, shape (blocks,).
+            instrument: Whether the instrument may err within its stated widths.  For predictions it is taken to be
+                right but for what is named.
+        """
+        chosen = self.chosen if chosen is None else chosen
+        space = self.space if without is None else self.space.without(without)
+        mean, cov = space.posterior(chosen, self.settings, instrument=instrument, scaled=self.scaled)
+        keep = np.r_[0 : self.space.inertials, self.space.offset : len(mean)]
+        return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
+
+    def torque_scale(self) -> tuple[float, float]:
+        """Logged over real torque of all joints alike, less one: mean and standard deviation."""
+        mean, cov = self.space.posterior(self.chosen, self.settings)
+        at = self.space.inertials
+        return GAIN_COMMON * float(mean[at]), GAIN_COMMON * float(np.sqrt(cov[at, at]))
+
+    def prediction(self, without: np.ndarray | None = None) -> tuple[Posterior, float, list[np.ndarray]]:
+        """What predicts: possible inertials and amplitudes, the torque scale less one, and each joint's own columns.
+
+        Args:
+            without: Which blocks of the data are left out, shape (blocks,).
+        """
+        space = self.space if without is None else self.space.without(without)
+        mean, cov = space.posterior(self.chosen, self.settings, instrument=False, scaled=self.scaled)
+        mean = self.of_bodies(mean, cov, self.chosen, space.offset)
+        columns = space.set_columns(self.chosen)
+        own = [space.own(j, s, columns, mean, instrument=False) for j, s in enumerate(self.settings)]
+        keep = np.r_[0 : space.inertials, space.offset : len(mean)]
+        post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
+        return post, GAIN_COMMON * float(mean[space.inertials]), own
+
+    def of_bodies(self, mean: np.ndarray, cov: np.ndarray, chosen: tuple[int, ...], first: int) -> np.ndarray:
+        """A posterior mean moved to the most probable inertials that bodies can have; all else moves along.
+
+        Args:
+            mean, cov: Of inertials first and a set's amplitudes last, in prior units.
+            chosen: The set.
+            first: Column of its first amplitude.
+        """
+        size = self.space.inertials
+        into = np.zeros((size, len(mean)))
+        into[:, :size] = np.diag(self.data.scale[:size])
+        for c in (self.data.candidates[i] for i in chosen):
+            own = first + np.arange(len(c.columns))
+            if c.slug == "inertials":
+                rows = (10 * np.array(c.joints)[:, None] + np.arange(10)).ravel()
+                into[rows, own] = self.data.scale[self.data.nuisances + c.columns]
+            first += len(own)
+        return of_bodies(mean, cov, into, np.asarray(self.lib.robot.phi), self.factor)
+
+    def probability(self, index: int) -> float:
+        """Of a chosen candidate's effect at its joints, over all sets visited."""
+        c = self.data.candidates[index]
+        return probabilities(self.data.candidates, self.sets).get((c.slug, c.joints), 0.0)
+
+    def rivals(self, index: int) -> dict[Site, float]:
+        """Share of the sets in which another effect stands in a chosen candidate's place, by that effect."""
+        return in_its_place(self.data.candidates, self.sets, self.chosen, index)[0]
 
 
 def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:
@@ -67,23 +158,6 @@ def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:
     widths = [len(data.candidates[i].columns) for i in chosen]
     ends = data.nuisances + np.cumsum(widths, dtype=int)
     return [slice(int(end) - width, int(end)) for end, width in zip(ends, widths, strict=True)]
-
-
-def full_posterior(
-    data: Data, prob: Problem, g: Grams, chosen: tuple[int, ...], without: np.ndarray | None = None
-) -> Posterior:
-    """Posterior of inertials and chosen amplitudes, in prior units, its mean of shape (10 n + amplitudes,).
-
-    Args:
-        data: Low-passed rows.
-        prob: Search problem.
-        g: Gram matrices by block.
-        chosen: Indices of the candidates.
-        without: Which blocks are left out, none by default, shape (blocks,).
-    """
-    columns, named = _columns(data, prob, chosen)
-    post = posterior(g.of(columns).total(without), np.arange(len(columns)), named)
-    return dataclasses.replace(post, columns=columns)
 
 
 def fitted(
@@ -95,64 +169,9 @@ def fitted(
     for i, part in zip(chosen, parts(data, chosen), strict=True):
         c = data.candidates[i]
         if c.slug == "inertials":
-            dphi = dphi + factor[:, 10 * c.joints[0] : 10 * c.joints[0] + 10] @ w[part]
+            rows = (10 * np.array(c.joints)[:, None] + np.arange(10)).ravel()
+            dphi = dphi + factor[:, rows] @ w[part]
         else:
             members.append(c)
             amplitudes.append(w[part])
     return dphi, members, amplitudes
-
-
-def noise_left(
-    stretches: list[Stretch], scale: np.ndarray, named: list[slice], noise: Noise, rounds: int = SETTLED
-) -> Noise:
-    """Noise that columns leave, fitted under noise that was guessed before, and again under what they leave.
-
-    Args:
-        stretches: With these columns alone, X of shape (R, n, columns).
-        scale: Their prior standard deviations, shape (columns,).
-        named: Those of each named effect; see `posterior`.
-        noise: The guess.
-        rounds: How often.
-
-    Returns:
-        The noise of each joint.
-    """
-    every, n = np.arange(len(scale)), stretches[0].y.shape[1]
-    use, unsure = [s.use for s in stretches], [s.unsure for s in stretches]
-    for _ in range(rounds):
-        post = posterior(grams(stretches, noise, scale, len(scale), 1).total(), every, named)
-        residuals = [s.y - s.X @ (post.mean * scale) for s in stretches]
-        # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
-        used = len(scale) - float(np.trace(post.cov))
-        noise = noise_from_residuals(residuals, use, np.full(n, used / n), unsure)
-    return noise
-
-
-def noise_under(data: Data, prob: Problem, chosen: tuple[int, ...], noise: Noise, rounds: int) -> Noise:
-    """Noise that the inertials and a set of candidates leave; see `noise_left`."""
-    columns, named = _columns(data, prob, chosen)
-    stretches = [dataclasses.replace(s, X=s.X[..., columns]) for s in data.stretches]
-    return noise_left(stretches, data.scale[columns], named, noise, rounds)
-
-
-def explained_by(ex: Explanation, chosen: tuple[int, ...]) -> Explanation:
-    """The explanation with a set of candidates, weighted by the noise that these leave.
-
-    Where none of them has a name, nothing makes products with the inertials: what is corrected is the refit.
-    """
-    data, named = ex.data, any(ex.data.candidates[i].slug != "inertials" for i in chosen)
-    if set(chosen) == set(ex.noise_of) and (named or all(s.bare for s in data.stretches)):
-        return dataclasses.replace(ex, chosen=chosen)
-    if not named:
-        data = dataclasses.replace(data, stretches=[s.stripped() for s in data.stretches])
-    noise = noise_under(data, ex.problem, chosen, ex.noise, SETTLED)
-    prob, g = problem(data, noise)
-    prob = dataclasses.replace(prob, lowest=ex.problem.lowest)  # what has no weight has none here
-    return dataclasses.replace(ex, data=data, noise=noise, noise_of=chosen, problem=prob, grams=g, chosen=chosen)
-
-
-def _columns(data: Data, prob: Problem, chosen: tuple[int, ...]) -> tuple[np.ndarray, list[slice]]:
-    """Columns of inertials and chosen amplitudes, and which of those are each named effect's."""
-    each = zip(chosen, parts(data, chosen), strict=True)
-    named = [part for i, part in each if data.candidates[i].slug != "inertials"]
-    return np.concatenate([np.arange(data.nuisances), prob.columns(chosen)]), named

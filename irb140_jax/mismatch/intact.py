@@ -9,6 +9,7 @@ import numpy as np
 from irb140_jax.effects.grids import Scales
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.model import CorrectedModel, Named
+from irb140_jax.mismatch.regression.discrepancy import FEATURES
 from irb140_jax.mismatch.undecided import Undecided
 from irb140_jax.recordings.low_pass import Band
 
@@ -48,6 +49,9 @@ def check_model(model: CorrectedModel) -> None:
     _check_band(model.band)
     for named in model.named:
         _check_named(named, n)
+    if model.discrepancy is not None:
+        _check("discrepancy", model.discrepancy.coefficients, (n, FEATURES))
+        _check_scales(model.discrepancy.scales, n)
 
 
 def check_undecided(open_: Undecided) -> None:
@@ -60,8 +64,7 @@ def check_undecided(open_: Undecided) -> None:
         _check(name, getattr(open_, name), (width,))
     _check("ar", open_.ar, (n, np.shape(open_.ar)[-1]))
     _check("level", open_.level, (n,))
-    for name in Scales._fields:
-        _check(name, getattr(open_.scales, name), () if name == "duration" else (n,))
+    _check_scales(open_.scales, n)
     _check("uncertainty", open_.uncertainty, (), positive=True)
     _check_band(open_.band)
     sets = [s for p in open_.pairs for s in (p.rest, *p.named_sets, *p.rival_sets)]
@@ -81,6 +84,11 @@ def _check_named(named: Named, n: int) -> None:
         raise ValueError(f"{slug}: it has no columns {named.variant}")
     _check(f"{slug}: amplitudes", named.amplitudes, (len(named.variant),))
     _check(f"{slug}: shape", named.shape, (np.size(named.shape),))
+
+
+def _check_scales(scales: Scales, n: int) -> None:
+    for name in Scales._fields:
+        _check(name, getattr(scales, name), () if name == "duration" else (n,))
 
 
 def _check_band(band: Band) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.explanation import Explanation, full_posterior
+from irb140_jax.mismatch.explanation import Explanation
 from irb140_jax.mismatch.scout import left_over
 from irb140_jax.robot import Robot
 
@@ -19,7 +19,7 @@ UNSEEN = 3.0  # a direction taken at random has six times as much of what isn't 
 
 
 def parameters_of(
-    robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray, widen: float
+    robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray
 ) -> dict[str, Any]:
     """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt.
 
@@ -29,14 +29,13 @@ def parameters_of(
         index: The finding among its candidates.
         w: Amplitudes of the finding, shape (k,).
         cov: Their covariance, shape (k, k).
-        widen: How much wider than by white noise they scatter over the recordings; so does its shape.
 
     Returns:
         By parameter: `value` and `std` in SI units, and the `unit`.
     """
     c = ex.data.candidates[index]
     value = _physical(c, w)
-    over_shapes = np.maximum(_variance_over_shapes(ex, index, value, widen), _variance_about_shape(ex, index, w, widen))
+    over_shapes = np.maximum(_variance_over_shapes(ex, index, value), _variance_about_shape(ex, index, w))
     w, cov = _of_all_columns(ex, index, w, cov)
     physical = lambda w: np.asarray(c.effect.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
     variance = _variance_of(physical, w, cov, value) + over_shapes
@@ -79,7 +78,7 @@ def _of_all_columns(ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray)
     c = ex.data.candidates[index]
     width = max(max(v) for v in c.effect.variants) + 1
     columns = c.columns[0] - c.variant[0] + np.arange(width)
-    H = ex.problem.eliminated_near(ex.chosen, columns + ex.problem.offset)
+    H = ex.near(ex.chosen, columns)
     scale = ex.data.scale[ex.data.nuisances + columns]
     full, spread = np.zeros(width), np.diag(scale**2 / (1.0 + np.diag(H)[:-1]))
     used = list(c.variant)
@@ -99,14 +98,13 @@ def _physical(c: Candidate, w: np.ndarray) -> np.ndarray:
     return np.asarray(c.effect.physical(jnp.asarray(full), jnp.asarray(c.shape)))
 
 
-def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray, widen: float) -> np.ndarray:
+def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:
     """Variance of the physical parameters over the refined grid of shapes, amplitudes fitted anew at each.
 
     Args:
         ex: The explanation.
         index: The finding.
         value: Its physical parameters.
-        widen: How much wider than by white noise its amplitudes scatter over the recordings; so does its shape.
     """
     c = ex.data.candidates[index]
     if not c.effect.refines():
@@ -116,8 +114,8 @@ def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray, widen:
         for i, o in enumerate(ex.data.candidates)
         if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant
     ]
-    gain = ex.problem.scores(others(ex, index), c.joints)[alike]
-    loss = np.where(np.isfinite(gain), gain[alike.index(index)] - gain, np.inf) / widen**2
+    gain = ex.gains(ex.others(index), alike)
+    loss = np.where(np.isfinite(gain), gain[alike.index(index)] - gain, np.inf)
     p = np.exp(-np.clip(loss - loss.min(), 0.0, 700.0)) if np.isfinite(loss).any() else np.ones(len(alike))
     p /= p.sum()
     shapes = np.array([ex.data.candidates[i].shape for i in alike])
@@ -135,7 +133,7 @@ def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray, widen:
     return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + c.effect.blur(c.shape) ** 2
 
 
-def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray, widen: float) -> np.ndarray:
+def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray) -> np.ndarray:
     """Variance of the physical parameters about the named shape, its parameters and the amplitudes all free at once.
 
     By the law's tangent: a grid that moves one parameter of the shape at a time does not see that a wall which leans
@@ -145,7 +143,6 @@ def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray, widen: flo
         ex: The explanation.
         index: The finding.
         w: Its amplitudes.
-        widen: As in `_variance_over_shapes`.
     """
     c, data = ex.data.candidates[index], ex.data
     alike = [o for o in data.candidates if (o.slug, o.joints, o.variant) == (c.slug, c.joints, c.variant)]
@@ -156,7 +153,7 @@ def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray, widen: flo
     columns = np.concatenate([c.columns, *(o.columns for o in near)])
     scale, k = data.scale[data.nuisances + columns], len(w)
     per_scale = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)  # zero: it moves nothing
-    H = ex.problem.eliminated_near(others(ex, index), columns + ex.problem.offset)[:-1, :-1]
+    H = ex.near(ex.others(index), columns)[:-1, :-1]
     # Amplitudes, and for each near shape the difference that its columns make at the amplitudes found.
     along = np.eye(k, len(columns))
     to = np.kron(np.eye(len(near)), w)
@@ -166,7 +163,7 @@ def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray, widen: flo
     value = _physical(c, w)
     slope = [(_physical(c, w + SMALL * step) - value) / SMALL for step in np.diag(scale[:k])]
     slope += [_physical(o, w) - value for o in near]
-    return widen**2 * np.einsum("ip,ij,jp->p", slope, cov, slope)
+    return np.einsum("ip,ij,jp->p", slope, cov, slope)
 
 
 def _variance_over_variants(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:
@@ -177,17 +174,18 @@ def _variance_over_variants(ex: Explanation, index: int, value: np.ndarray) -> n
         for i, o in enumerate(ex.data.candidates)
         if (o.slug, o.joints) == (c.slug, c.joints) and o.variant != c.variant and np.array_equal(o.shape, c.shape)
     ]
-    scores = ex.problem.scores(others(ex, index), c.joints)
-    # What is not admissible has a score of minus infinity.
-    forms = [i for i in forms if np.isfinite(scores[i]) and np.isfinite(scores[index])]
-    weight = np.exp(np.clip(scores[forms] - scores[index], -50.0, 50.0))
+    gains = ex.gains(ex.others(index), [*forms, index])
+    # What is not admissible has a gain of minus infinity.
+    known = np.isfinite(gains[:-1]) & np.isfinite(gains[-1])
+    forms = [i for i, k in zip(forms, known, strict=True) if k]
+    weight = np.exp(np.clip(gains[:-1][known] - gains[-1], -50.0, 50.0))
     differ = np.array([(_refitted(ex, index, i) - value) ** 2 for i in forms]).reshape(-1, len(value))
     return weight @ differ / (1.0 + weight.sum())
 
 
 def _refitted(ex: Explanation, index: int, other: int) -> np.ndarray:
     """Physical parameters where another candidate of the same kind stands in a finding's place."""
-    post = full_posterior(ex.data, ex.problem, ex.grams, (*others(ex, index), other))
+    post = ex.posterior((*ex.others(index), other))
     c = ex.data.candidates[other]
     k = len(c.columns)
     return _physical(c, (post.mean * ex.data.scale[post.columns])[-k:])
@@ -195,11 +193,7 @@ def _refitted(ex: Explanation, index: int, other: int) -> np.ndarray:
 
 def _inertial_doubt(ex: Explanation, c: Candidate) -> float:
     """Relative standard deviation left in the inertials of the links that a joint carries, root mean square."""
-    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    post = ex.posterior()
     carried = slice(10 * min(c.joints), ex.data.nuisances)
     return float(ex.data.scale[0] * np.sqrt(np.mean(np.diag(post.cov)[carried])))
 
-
-def others(ex: Explanation, index: int) -> tuple[int, ...]:
-    """The members of an explanation but one."""
-    return tuple(c for c in ex.chosen if c != index)

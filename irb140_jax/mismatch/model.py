@@ -14,13 +14,14 @@ from irb140_jax.errors import InputError
 from irb140_jax.mismatch.along import Columns, Loads, columns_along, prepared, seen_by
 from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.consistent import consistent
+from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.recordings.condition import Conditioned, condition
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot, with_phi
 
-SCHEMA = 1  # of model.json
+SCHEMA = 2  # of model.json
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,6 +47,29 @@ class Named:
         full = np.zeros(max(max(v) for v in self.effect.variants) + 1)
         full[list(self.variant)] = self.amplitudes
         return full
+
+
+def scaled(n: int, named: Sequence[Named], scale: float) -> tuple[Named, ...]:
+    """The effects where one scale of all torques is off: a torque gain on every joint.
+
+    Friction was found in the torque that is logged; the model holds the real one, which the gain turns into it.
+
+    Args:
+        n: Number of joints.
+        named: The effects.
+        scale: Logged over real torque, less one.
+    """
+    if not scale:
+        return tuple(named)
+    gain, out = CATALOGUE["torque_gain"], []
+    for one in named:
+        if one.effect.friction:
+            out.append(dataclasses.replace(one, amplitudes=one.amplitudes / (1.0 + scale)))
+        elif one.effect is not gain:
+            out.append(one)
+    own = {m.joints[0]: m.amplitudes[0] for m in named if m.effect is gain}
+    every = (np.array([scale + own.get(j, 0.0)]) for j in range(n))
+    return (*out, *(Named(gain, (j,), (0,), w, np.zeros(0)) for j, w in enumerate(every)))
 
 
 def as_named(robot: Robot, named: Sequence[Named]) -> Robot:
@@ -103,6 +127,7 @@ class CorrectedModel:
         rest_speed: Speed that the encoders of the recordings can't tell from rest [rad/s or m/s], shape (n,).
         known_joints: Every joint of the model's file, in its order, of which the robot may be a part: column maps
             number joints by it.
+        discrepancy: What the laws leave without a name, where it helps on unseen motions.
     """
 
     robot: Robot
@@ -112,6 +137,7 @@ class CorrectedModel:
     band: Band
     rest_speed: np.ndarray
     known_joints: tuple[str, ...] = ()
+    discrepancy: Discrepancy | None = None
 
 
 def composed(
@@ -170,10 +196,13 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     amplitudes = [named.amplitudes for named in model.named]
     along = seen_by(better_known(model.robot, model.phi_corrected, model.named), prepared(model.robot, recording))
     torques = composed(lib, columns_along(lib, along), lib.candidates, amplitudes, *shifts)
-    if not model.named:
+    if model.named:
+        # Columns that depend on the load see the corrected one, as they did in the fit.
+        torques = composed(lib, columns_along(lib, along, torques.loads), lib.candidates, amplitudes, *shifts)
+    if model.discrepancy is None:
         return torques
-    # Columns that depend on the load see the corrected one, as they did in the fit.
-    return composed(lib, columns_along(lib, along, torques.loads), lib.candidates, amplitudes, *shifts)
+    rest = model.discrepancy.along(recording, torques.loads.load)
+    return dataclasses.replace(torques, corrected=torques.corrected + rest)
 
 
 def predict(model: CorrectedModel, recording: Recording) -> dict[str, np.ndarray]:
@@ -231,6 +260,7 @@ def to_json(model: CorrectedModel) -> dict[str, Any]:
             }
             for n in model.named
         ],
+        "discrepancy": model.discrepancy.to_json() if model.discrepancy else None,
     }  # fmt: skip
 
 
@@ -257,6 +287,7 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
         Band(**data["band"]),
         np.array(data["rest_speed"], dtype=float),
         tuple(data.get("known_joints", robot["joint_names"])),
+        Discrepancy.from_json(data["discrepancy"]) if data["discrepancy"] else None,
     )  # fmt: skip
 
 

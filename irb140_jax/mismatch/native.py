@@ -6,13 +6,13 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.mismatch.consistent import consistent
+from irb140_jax.mismatch.consistent import consistent, is_body
 from irb140_jax.mismatch.model import CorrectedModel, Named, as_named
 from irb140_jax.oracle.mujoco import inverse_dynamics, oracle_model
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
 
-MOST = 4000  # samples of a recording along which the file is compared: 20 s at the working rate
+MOST = 1000  # samples of a recording along which the file is compared: 5 s at the working rate
 XML, NOTES = "corrected.xml", "corrected.md"
 
 
@@ -22,7 +22,10 @@ def native_robot(model: CorrectedModel) -> Robot:
     Its torque of a motion is the joint's; the controller's log shows that torque times `model.robot.gear` over its own
     gear, which holds the torque constants found wrong.
     """
-    phi = consistent(model.phi_corrected, np.asarray(model.robot.phi))
+    nominal = np.asarray(model.robot.phi)
+    phi = consistent(model.phi_corrected, nominal)
+    # A link whose nominal inertials are those of no body, as a point mass's, keeps them.
+    phi = np.where(np.array([is_body(p) for p in nominal])[:, None], phi, nominal)
     return as_named(with_phi(model.robot, jnp.asarray(phi)), model.named)
 
 

@@ -8,6 +8,7 @@ frequency where it falls.  Both are then conservative.
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import linalg, signal
@@ -29,11 +30,13 @@ class Noise:
         ar: Coefficients of the whitening filter (leading 1), shape (n, ORDER + 1).
         level: Standard deviation of the innovations, shape (recordings, n) [N m or N].
         total: Standard deviation of the noise itself in the band, shape (recordings, n) [N m or N].
+        alike: Correlation time of each joint's residual [rows], shape (n,); see `correlation_time`.
     """
 
     ar: np.ndarray
     level: np.ndarray
     total: np.ndarray
+    alike: np.ndarray
 
     def whitened(self, x: np.ndarray, joint: int, recording: int, unsure: np.ndarray | float = 0.0) -> np.ndarray:
         """Rows of one joint (axis 0) with white noise of unit variance; only `usable` ones are to be used.
@@ -55,7 +58,7 @@ class Noise:
 
 
 def spread(unsure: np.ndarray | float, total: np.ndarray | float) -> np.ndarray:
-    """How many times as loud as the noise a row is that is unsure by so much beside it."""
+    """Standard deviation of a row over that of the noise, where `unsure` [N m or N] comes on top of the noise."""
     return np.sqrt(1.0 + (np.asarray(unsure) / total) ** 2)
 
 
@@ -74,14 +77,17 @@ def noise_from_residuals(
         The noise model; levels never fall below 1e-9 of a unit, so that noise-free input stays finite.
     """
     n, unsure = residuals[0].shape[1], unsure or [np.zeros_like(r) for r in residuals]
-    ar = np.zeros((n, ORDER + 1))
+    ar, alike = np.zeros((n, ORDER + 1)), np.ones(n)
     level, total = np.zeros((len(residuals), n)), np.zeros((len(residuals), n))
     for j in range(n):
         scale = [_size(r[u[:, j], j], b[u[:, j], j]) for r, u, b in zip(residuals, use, unsure, strict=True)]
         # Each recording counts by its shape, not by its size: the loudest must not decide the colour.
-        acov = np.zeros((2, ORDER + 1))
+        acov, counted = np.zeros((2, ORDER + 1)), []
         for r, u, b, s in zip(residuals, use, unsure, scale, strict=True):
-            acov += _autocovariance(r[:, j] / (s * spread(b[:, j], s)), u[:, j]) if s > 0 else 0.0
+            if s > 0:
+                counted.append(np.where(u[:, j], r[:, j] / (s * spread(b[:, j], s)), 0.0))
+                acov += _autocovariance(counted[-1], u[:, j])
+        alike[j] = correlation_time(counted)
         ar[j], innovation = _whitener(_per_pair(*acov))
         rows = sum(int(u[:, j].sum()) for u in use)
         inflate = np.sqrt(rows / max(rows - dof[j], 0.2 * rows, 1.0))
@@ -92,7 +98,29 @@ def noise_from_residuals(
     for x in (level, total):
         median = np.array([np.median(c[c > 0]) if np.any(c > 0) else 1.0 for c in x.T])
         np.copyto(x, median, where=x <= 0)
-    return Noise(ar, np.maximum(level, 1e-9), np.maximum(total, 1e-9))
+    return Noise(ar, np.maximum(level, 1e-9), np.maximum(total, 1e-9), alike)
+
+
+def correlation_time(series: Sequence[np.ndarray]) -> float:
+    """Correlation time of stationary signals [rows]: their autocorrelation summed over both sides to its first zero.
+
+    It is the spectrum at the lowest frequencies over its mean.  The variance of a mean over many rows is larger by this
+    factor than it would be with white noise of the same size.
+
+    Args:
+        series: Shape (R,) each.
+
+    Source: Priestley, Spectral Analysis and Time Series, 1981, sec. 5.3: variance of the mean of a stationary process.
+    """
+    products = np.zeros(max((len(x) for x in series), default=1))
+    for x in series:
+        spectrum = np.abs(np.fft.rfft(x, 2 * len(x))) ** 2
+        products[: len(x)] += np.fft.irfft(spectrum)[: len(x)]
+    if products[0] <= 0.0:
+        return 1.0
+    together = products / products[0]
+    crossing = int(np.argmax(together <= 0.0)) or len(together)
+    return float(max(2.0 * together[:crossing].sum() - 1.0, 1.0))
 
 
 def ridge(A: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
@@ -149,7 +177,7 @@ def _whitener(acov: np.ndarray) -> tuple[np.ndarray, float]:
     response = np.abs(np.fft.rfft(a, SPECTRUM)) ** 2
     rising = np.maximum.accumulate(variance / response)
     acov = np.fft.irfft(rising, SPECTRUM)[: ORDER + 1]
-    acov = acov * max(1.0, 1.0 / acov[0])  # over gaps, autocovariances may belong to no spectrum; never less than seen
+    acov = acov / acov[0]
     a, variance = _yule_walker(acov)
     if np.abs(a[1:]).max() < NEGLIGIBLE:
         return np.eye(1, ORDER + 1)[0], float(np.sqrt(acov[0]))

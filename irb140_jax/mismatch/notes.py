@@ -3,11 +3,18 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import stats
 
+from irb140_jax.mismatch.explanation import Explanation
+from irb140_jax.mismatch.prove import HeldOut
+from irb140_jax.mismatch.regression.nuisances import DELAY_JOINT, FIXED, SCALED
+from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
+SLOPE = SCALED.index("slope")
+FAR = 3.0  # prior standard deviations from which an error of the instrument is a finding of its own
 NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
 
 
@@ -51,12 +58,73 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
     if gap is None:
         return ["corrected.xml could not be compared with the corrected model: MuJoCo has other joints."]
     reason = f"it lacks {', '.join(left_out)} in whole or in part" if left_out else (
-        "the fitted inertials are physically impossible, and the file holds the nearest possible ones")
+        "a link of the model has inertials that are physically impossible, and keeps them in the file")
     return [
         f"On {name} the torque of corrected.xml differs from that of the corrected model by {g:.3g} "
         f"{'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of its torque): {reason}. Use `irb140 predict` instead."
         for name, slide, g, t in zip(robot.joint_names, robot.is_slide, gap, torque, strict=True)
         if g > NOTABLE_GAP * t > 0.0
+    ]
+
+
+def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
+    """A note for every joint whose dry friction differs from recording to recording.
+
+    Said where a level of friction of its own for each recording is more probable than one for all, against the odds of
+    any rare effect.
+
+    Args:
+        ex: The explanation.
+        names: Of the recordings.
+    """
+    out = []
+    _, _, own = ex.prediction()
+    for j, setting in enumerate(ex.settings):
+        alike = (*ex.settings[:j], (*setting[:SLOPE], 0, *setting[SLOPE + 1 :]), *ex.settings[j + 1 :])
+        gain = ex.space.log_evidence(ex.chosen, ex.settings) - ex.space.log_evidence(ex.chosen, alike)
+        slopes = ex.extra[0].groups[j] == SLOPE
+        if slopes.any() and gain > -np.log(RARE):
+            unit = "N" if ex.lib.robot.is_slide[j] else "N m"
+            each = (own[j] * ex.extra[0].units[j])[slopes]
+            said = ", ".join(f"{x:+.3g} {unit} in {name}" for x, name in zip(each, names, strict=True))
+            out.append(f"Friction of {ex.lib.robot.joint_names[j]} differs between the recordings: {said}.")
+    return out
+
+
+def skew_notes(ex: Explanation) -> list[str]:
+    """A note for every joint whose torque is logged early or late beside its position, by more than channels may be.
+
+    Its odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
+    any rare effect.
+
+    Args:
+        ex: The explanation.
+    """
+    out, delay = [], FIXED.index("delay")
+    mean, _ = ex.space.posterior(ex.chosen, ex.settings)
+    columns = ex.space.set_columns(ex.chosen)
+    for j, (g, setting) in enumerate(zip(ex.space.joints, ex.settings, strict=True)):
+        own = ex.space.own(j, setting, columns, mean, instrument=True)[delay]
+        spread = g.at(setting).spread()[delay]
+        odds = stats.norm.logpdf(0.0) - stats.norm.logpdf(0.0, own, spread) + np.log(RARE)
+        if odds > 0.0 and abs(own) > FAR:
+            out.append(
+                f"Torque of {ex.lib.robot.joint_names[j]} is logged {1e3 * DELAY_JOINT * abs(own):.2g} +- "
+                f"{1e3 * DELAY_JOINT * spread:.1g} ms {'early' if own > 0.0 else 'late'} beside its position and the "
+                "other joints'; this is taken into account."
+            )
+    return out
+
+
+def discrepancy_notes(robot: Robot, proof: HeldOut) -> list[str]:
+    """A note where the corrected model holds torque without a name."""
+    joints = [name for name, carried in zip(robot.joint_names, proof.carried, strict=True) if carried]
+    if not joints:
+        return []
+    return [
+        f"On {', '.join(joints)} the corrected model adds a function of the joint's own motion that no effect names, "
+        "because it makes the error of every unseen motion smaller. `irb140 predict` holds it; corrected.xml and "
+        "load_corrected do not."
     ]
 
 

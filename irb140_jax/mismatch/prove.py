@@ -1,17 +1,18 @@
-"""Does it hold on data that the fit did not see?  Recordings, or blocks of a single one, are left out in turn."""
+"""Does it hold on data that the fit did not see?  Motions, or blocks of a single one, are left out in turn."""
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 
 from irb140_jax.mismatch.assemble import BLOCKS
 from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
-from irb140_jax.mismatch.explanation import Explanation, explained_by, full_posterior, noise_left, parts
-from irb140_jax.mismatch.name import ACCEPT, PREFER, possible_beside, simpler
+from irb140_jax.mismatch.explanation import Explanation, parts
+from irb140_jax.mismatch.noise import Noise, noise_from_residuals
+from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
+from irb140_jax.mismatch.rows import Stretch
 
-MOST_OF_IT = 0.5  # of what is known of an amplitude, beyond which the block that holds it is no sample of its scatter
-ALONE = 0.8  # share of a joint's usable rows, or of a finding's torque, beside which the others say nothing of it
+ALONE = 0.8  # share of a joint's usable rows, or of a finding's torque, without which nothing is known of it
+SETTLED = 2  # rounds in which the noise and what leaves it agree
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,16 +22,18 @@ class HeldOut:
     Attributes:
         nominal: Of the model as given.
         refit: Of the rigid body with refitted inertials.
-        corrected: Of refit and findings together.
+        named: Of refit and findings together.
+        corrected: The same, with the discrepancy where it is carried.
         use: Rows that count, (R, n).
-        floor: Standard deviation of what the explanation leaves on data it did see, parameters paid for, shape (n,).
+        carried: Joints at which the discrepancy makes every unseen motion's error smaller, shape (n,).
     """
 
     nominal: list[np.ndarray]
     refit: list[np.ndarray]
+    named: list[np.ndarray]
     corrected: list[np.ndarray]
     use: list[np.ndarray]
-    floor: np.ndarray
+    carried: np.ndarray
 
     @property
     def judged(self) -> np.ndarray:
@@ -49,11 +52,11 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     A motion that all but alone moves some joint, or all but alone holds what a finding does, is left out block by
     block, too: without it nothing is known there, and a wall that is touched once would drown all else.
     """
-    g = ex.grams
-    out, weight = [], np.vstack([g.rows.T, _energy(ex, ex.chosen)])
+    recording = _recordings(ex)
+    out, weight = [], np.vstack([np.stack([g.rows for g in ex.space.joints]), _energy(ex, ex.chosen)])
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
     of_recording = np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches])
-    motion, number = of_recording[g.recording], _number_within(g.recording)
+    motion, number = of_recording[recording], np.tile(np.arange(BLOCKS), len(ex.data.stretches))
     for m in dict.fromkeys(motion.tolist()):
         mine = motion == m
         alone = np.max(weight[:, mine].sum(axis=1)) > ALONE
@@ -61,18 +64,20 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     return out
 
 
-def _number_within(recording: np.ndarray) -> np.ndarray:
-    """Number of each block within its recording, shape (blocks,)."""
-    return np.arange(len(recording)) - np.searchsorted(recording, recording)
+def _recordings(ex: Explanation) -> np.ndarray:
+    """Recording of each block, shape (blocks,)."""
+    return np.repeat([s.recording for s in ex.data.stretches], BLOCKS)
 
 
 def _energy(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:
     """Squared whitened torque of each member of a set in each block, shape (members, blocks)."""
-    mean = full_posterior(ex.data, ex.problem, ex.grams, chosen).mean
-    out = np.zeros((len(chosen), len(ex.grams.recording)))
+    mean, space = ex.posterior(chosen, instrument=False).mean, ex.space
+    out = np.zeros((len(chosen), len(space.joints[0].blocks)))
     for k, (c, part) in enumerate(zip(chosen, parts(ex.data, chosen), strict=True)):
-        columns, w = ex.problem.columns((c,)), mean[part]
-        out[k] = np.einsum("i,bij,j->b", w, ex.grams.blocks[:, columns[:, None], columns], w)
+        for g, place in zip(space.joints, space.places, strict=True):
+            at = place[space.columns[c]]
+            w, at = mean[part][at >= 0], at[at >= 0] + len(g.groups)
+            out[k] += np.einsum("i,bij,j->b", w, g.blocks[:, at[:, None], at], w)
     return out
 
 
@@ -81,178 +86,107 @@ class Refit:
     """The rigid body with refitted inertials and nothing else.
 
     Attributes:
-        grams: Gram matrices of its columns alone, under the noise that it leaves.
-        columns: Which of all columns those are.
+        ex: The explanation that it stands beside.
+        loose: Its candidates that stand for inertials wrong beyond their stated uncertainty: free here too.
+        grams: Gram matrices of their columns and the inertials' alone, under the noise that those leave.
     """
 
+    ex: Explanation
+    loose: tuple[int, ...]
     grams: Grams
-    columns: np.ndarray
+
+    @property
+    def columns(self) -> np.ndarray:
+        """Which of all columns those are."""
+        return self.ex.columns(self.loose)
 
     def posterior(self, without: np.ndarray | None = None) -> Posterior:
-        """Inertials from all blocks, or from all but some."""
+        """Inertials of possible bodies from all blocks, or from all but some."""
         post = posterior(self.grams.total(without), np.arange(len(self.columns)))
-        return dataclasses.replace(post, columns=self.columns)
+        mean = self.ex.of_bodies(post.mean, post.cov, self.loose, self.ex.data.nuisances)
+        return Posterior(self.columns, mean, post.cov)
 
 
 def refitted(ex: Explanation) -> Refit:
-    """Refit the inertials; links that the explanation found wrong beyond their stated uncertainty are free here too.
-
-    Where nothing is named this is the explanation, under its noise.
-    """
-    columns = ex.columns(tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials"))
+    """Refit the inertials beside an explanation."""
+    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
+    columns = ex.columns(loose)
     stretches = [s.of_rigid_body(columns) for s in ex.data.stretches]
-    scale, alone = ex.data.scale[columns], len(columns) == len(ex.columns())
-    noise = ex.noise if alone else noise_left(stretches, scale, [], ex.noise)
-    return Refit(grams(stretches, noise, scale, len(columns), BLOCKS), columns)
+    scale = ex.data.scale[columns]
+    return Refit(ex, loose, grams(stretches, _noise_left(stretches, scale, ex.noise), scale, len(columns), BLOCKS))
+
+
+def _noise_left(stretches: list[Stretch], scale: np.ndarray, noise: Noise) -> Noise:
+    """Noise that columns leave, fitted under noise that was guessed before, and again under what they leave."""
+    every, n = np.arange(len(scale)), stretches[0].y.shape[1]
+    for _ in range(SETTLED):
+        post = posterior(grams(stretches, noise, scale, len(scale), 1).total(), every)
+        residuals = [s.y - s.X @ (post.mean * scale) for s in stretches]
+        # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
+        dof = np.full(n, (len(scale) - float(np.trace(post.cov))) / n)
+        noise = noise_from_residuals(residuals, [s.use for s in stretches], dof, [s.unsure for s in stretches])
+    return noise
 
 
 def held_out(ex: Explanation, refit: Refit) -> HeldOut:
-    """Residuals of the rival models, each row predicted from the other recordings (or blocks)."""
-    data, energy = ex.data, _energy(ex, ex.chosen)
-    seen = full_posterior(data, ex.problem, ex.grams, ex.chosen).mean
+    """Residuals of the rival models, each row predicted from the other motions (or blocks)."""
+    data, energy, recording = ex.data, _energy(ex, ex.chosen), _recordings(ex)
+    seen = ex.posterior(instrument=False).mean
     bare = [s.of_rigid_body(refit.columns) for s in data.stretches]
-    out = {"refit": [s.y.copy() for s in bare], "corrected": [s.y.copy() for s in data.stretches]}
+    out = {"refit": [s.y.copy() for s in bare], "named": [s.y.copy() for s in data.stretches]}
+    out["flexible"] = [s.y.copy() for s in data.stretches]
+    better = np.ones(len(ex.settings), dtype=bool)
     for fold in folds(ex):
-        unseen = full_posterior(data, ex.problem, ex.grams, ex.chosen, fold).mean
-        corrected = np.where(_only_here(ex, ex.chosen, energy, fold), seen, unseen)
-        means = {"refit": refit.posterior(fold).mean * data.scale[refit.columns]}
-        means["corrected"] = corrected * data.scale[ex.columns()]
+        post, scale, own = ex.prediction(fold)
+        corrected = np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean) * data.scale[post.columns]
+        inertial = refit.posterior(fold).mean * data.scale[refit.columns]
+        gain = np.zeros(len(better))
         for r, s in enumerate(data.stretches):
-            mine = fold[ex.grams.recording == s.recording]
+            mine = fold[recording == s.recording]
             edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
             for b in np.flatnonzero(mine):
                 rows = slice(edges[b], edges[b + 1])
-                out["refit"][r][rows] -= bare[r].X[rows] @ means["refit"]
-                out["corrected"][r][rows] -= s.X[rows][..., ex.columns()] @ means["corrected"]
-    nominal = [s.tau - s.nominal for s in data.stretches]
-    level = np.sqrt(np.mean(ex.noise.total**2, axis=0))
-    return HeldOut(nominal, out["refit"], out["corrected"], [s.use for s in data.stretches], level)
+                out["refit"][r][rows] -= bare[r].X[rows] @ inertial
+                out["named"][r][rows] -= s.X[rows][..., post.columns] @ corrected
+                out["named"][r][rows] -= scale / GAIN_COMMON * ex.extra[r].common[rows, :, 0]
+                delta = np.stack([x[rows] @ v for x, v in zip(ex.extra[r].own, own, strict=True)], axis=1)
+                out["flexible"][r][rows] = out["named"][r][rows] - delta
+                old, new = (np.where(s.use[rows], out[k][r][rows], 0.0) for k in ("named", "flexible"))
+                gain += np.sum(old**2 - new**2, axis=0)
+        better &= gain > 0.0
+    nominal, use = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches]
+    carried = [np.where(better, f, c) for f, c in zip(out["flexible"], out["named"], strict=True)]
+    return HeldOut(nominal, out["refit"], out["named"], carried, use, better)
 
 
-def unseen_error(ex: Explanation, chosen: tuple[int, ...]) -> float:
+def held_out_gains(ex: Explanation) -> dict[int, float]:
+    """Share of the whitened squared error on unseen data, noise included, that each finding removes."""
+    left_out = folds(ex)
+    whole = _unseen_error(ex, ex.chosen, left_out)
+    without = {i: _unseen_error(ex, ex.others(i), left_out) for i in ex.chosen}
+    return {i: (error - whole) / max(error, 1e-300) for i, error in without.items()}
+
+
+def _unseen_error(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> float:
     """Whitened squared error of a set on data that its fit did not see."""
-    columns, error = ex.columns(chosen), 0.0
-    own = ex.grams.of(columns)
-    every, energy = np.arange(len(columns)), _energy(ex, chosen)
-    seen = posterior(own.total(), every).mean
-    for fold in folds(ex):
+    space, error, energy = ex.space, 0.0, _energy(ex, chosen)
+    columns = space.with_y(space.set_columns(chosen))
+    seen = ex.posterior(chosen, instrument=False).mean
+    for fold in left_out:
         only = _only_here(ex, chosen, energy, fold)
-        w = np.append(np.where(only, seen, posterior(own.total(fold), every).mean), -1.0)
-        error += float(w @ own.blocks[fold].sum(axis=0) @ w)
+        mean = np.where(only, seen, ex.posterior(chosen, fold, instrument=False).mean)
+        w = np.zeros(len(columns))
+        w[: space.inertials], w[space.offset : -1], w[-1] = mean[: space.inertials], mean[space.inertials :], -1.0
+        for g, place in zip(space.joints, space.places, strict=True):
+            at = place[columns]
+            v, at = w[at >= 0], at[at >= 0] + len(g.groups)
+            error += float(v @ g.blocks[fold].sum(axis=0)[np.ix_(at, at)] @ v)
     return error
 
 
 def _only_here(ex: Explanation, chosen: tuple[int, ...], energy: np.ndarray, fold: np.ndarray) -> np.ndarray:
-    """Which columns of a set belong to what happens once, or but for a trace in this fold: no other tells of them."""
+    """Columns of members that only this fold can tell of: they happen once, or nearly all of their torque is in it."""
     members = [ex.data.candidates[i] for i in chosen]
     alone = energy[:, fold].sum(axis=1) > ALONE * energy.sum(axis=1)
     each = [np.full(len(c.columns), c.effect.once or a) for c, a in zip(members, alone, strict=True)]
     return np.concatenate([np.zeros(ex.data.nuisances, dtype=bool), *each])
-
-
-def held_out_gain(ex: Explanation, without: int) -> tuple[float, float]:
-    """What a finding is worth on unseen data.
-
-    Returns:
-        Share of the whitened squared error, noise included, that the finding removes; and the log-likelihood gain.
-    """
-    rest = unseen_error(ex, tuple(c for c in ex.chosen if c != without))
-    drop = rest - unseen_error(ex, ex.chosen)
-    return drop / max(rest, 1e-300), 0.5 * drop
-
-
-def transferring(ex: Explanation) -> Explanation:
-    """The explanation without findings, or refinements of a simpler law, that do not help on unseen data.
-
-    A name must transfer: a refinement by as much as the search asks of it on seen data, a finding at all.  Beside the
-    error on unseen data counts how far the inertials must be from where the model has them, in stated standard
-    deviations: a rotor or a payload that inertials of twenty deviations could stand for predicts no better than they.
-    """
-    while True:
-        error = unseen_error(ex, ex.chosen) + _strain(ex, ex.chosen)
-        worst, better = 0.0, ex.chosen
-        for c in ex.chosen:
-            if ex.data.candidates[c].effect.silent:
-                continue
-            rest = tuple(x for x in ex.chosen if x != c)
-            fits = np.isfinite(ex.problem.scores(rest, ex.data.candidates[c].joints))
-            options = [o for o in possible_beside(ex.problem, rest, simpler(ex.problem, c)) if fits[list(o)].all()]
-            for option, least in ((), 0.0), *((o, PREFER) for o in options):
-                other = (*rest, *option)
-                loss = 0.5 * (unseen_error(ex, other) + _strain(ex, other) - error) - least
-                if loss < worst:
-                    worst, better = loss, (*rest, *option)
-        if better == ex.chosen:
-            return ex
-        ex = explained_by(ex, better)
-
-
-def lasting(ex: Explanation) -> Explanation:
-    """The explanation without findings that are not beyond what their amplitudes scatter by over the recordings.
-
-    White noise would be sure of a trace that each recording puts elsewhere: of a law that is another's shadow.  What
-    the scatter says of an amplitude takes the place of what white noise would in the evidence for it.  Of what is late,
-    smoothing and control in steps may make any part up to a bound: what is beyond it counts.
-    """
-    while True:
-        post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
-        # What happens in one block only is not contradicted by the others.
-        wide = scatter(ex, [True] * len(ex.chosen))
-        odds = {}
-        for i, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
-            if ex.data.candidates[i].effect.silent:
-                continue
-            mean, known = post.mean[part], np.linalg.inv(post.cov[part, part])
-            bound = np.sqrt(3.0 * np.diag(post.cov[part, part])) * ex.problem.imitated[i]
-            sure = np.sign(mean) * np.maximum(np.abs(mean) - bound, 0.0) / wide[part]
-            alone = ex.problem.odds(tuple(x for x in ex.chosen if x != i), (i,))
-            odds[i] = alone - 0.5 * (mean @ known @ mean - sure @ known @ sure) + float(np.log(wide[part]).sum())
-        least = min(odds, key=lambda i: odds[i], default=None)
-        if least is None or odds[least] >= ACCEPT:
-            return ex
-        ex = explained_by(ex, tuple(i for i in ex.chosen if i != least))
-
-
-def _strain(ex: Explanation, chosen: tuple[int, ...]) -> float:
-    """Squared shift of the inertials that a set needs, in stated standard deviations."""
-    mean = full_posterior(ex.data, ex.problem, ex.grams, chosen).mean
-    return float(mean[: ex.data.nuisances] @ mean[: ex.data.nuisances])
-
-
-def jackknife_factor(ex: Explanation) -> np.ndarray:
-    """How much wider than the posterior the estimates are, per amplitude, never below 1.
-
-    As much as they scatter; and what is out of time is known no better than the smoothing and the steps of the control,
-    which are as late in all blocks.
-    """
-    imitated = ex.problem.imitated[list(ex.chosen)]
-    late = [np.full(len(m.columns), i) for m, i in zip(ex.members, imitated, strict=True)]
-    return np.hypot(
-        scatter(ex, [m.effect.once for m in ex.members]), np.concatenate([np.zeros(ex.data.nuisances), *late])
-    )
-
-
-def scatter(ex: Explanation, lopsided: Sequence[bool]) -> np.ndarray:
-    """How much wider than the posterior the estimates scatter over the recordings, per amplitude, never below 1.
-
-    Blocks are left out in turn; scatter over recordings is the primary error bar, since it sees what white noise
-    does not: laws that fit here and not there.
-
-    Args:
-        ex: The explanation.
-        lopsided: Of which of its members a block that holds most of what is known, of a push or of a wall that is
-            touched once, is no sample of scatter: when it goes, its weight is that of its share (Busing, Meijer and
-            van der Leeden, Statistics and Computing 9, 1999).
-    """
-    whole = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
-    blocks = len(ex.grams.recording)
-    left_out = [np.arange(blocks) == b for b in range(blocks)]
-    posts = [full_posterior(ex.data, ex.problem, ex.grams, ex.chosen, b) for b in left_out]
-    known, means = np.maximum(np.diag(whole.cov), 1e-300), np.array([p.mean for p in posts])
-    each = [np.full(len(m.columns), one) for m, one in zip(ex.members, lopsided, strict=True)]
-    spared = np.concatenate([np.full(ex.data.nuisances, False), *each])
-    share = np.maximum(1.0 - known / [np.diag(p.cov) for p in posts], MOST_OF_IT)
-    weight = np.where(spared & (share > MOST_OF_IT), (1.0 - share) / share, blocks - 1.0)
-    centre = np.where(spared, whole.mean, means.mean(axis=0))
-    variance = np.sum(weight * (means - centre) ** 2, axis=0) / blocks
-    return np.sqrt(np.maximum(variance / known, 1.0))

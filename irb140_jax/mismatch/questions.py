@@ -13,6 +13,7 @@ from irb140_jax.mismatch.candidates import Library
 from irb140_jax.mismatch.evidence import eliminated, gain_of, grams, posterior
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
+from irb140_jax.mismatch.regression.gram import USUAL
 from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.testable import played, stands_out
 from irb140_jax.mismatch.undecided import Pair, Sets, Undecided
@@ -55,16 +56,16 @@ class Questions:
         scale = np.concatenate(
             [np.full(len(self._factor), o.uncertainty), np.full(10 * len(o.loose), LOOSE_STD), o.scale]
         )
-        noise = Noise(o.ar, o.level[None], o.level[None])
+        noise = Noise(o.ar, o.level[None], o.level[None], np.ones(len(o.ar)))
         return grams([dataclasses.replace(rows, X=X)], noise, scale, len(self._always), 1).total()[:-1, :-1]
 
     def margin(self, added: np.ndarray, pair: Pair, *, exact: bool = False) -> float:
         """Log odds expected in favour of the true one of two explanations, whichever is true, the worse of the two.
 
         The log that either predicts is added to the recordings there are; the other does with it what it can, with
-        inertials, amplitudes and shapes free: half the divergence that T-optimal designs maximise.  What an imperfect
-        law could feign (`feigned`) is taken off as if all were one recording, so that the motion convinces without the
-        others' help; below zero, they stay even.
+        inertials, amplitudes and shapes free: half the divergence that T-optimal designs maximise.  What laws
+        are usually wrong by (`USUAL`) is taken off, so that the motion convinces all the same; below zero, they stay
+        even.
 
         Args:
             added: What the motion adds, from `gram`.
@@ -78,27 +79,24 @@ class Questions:
     def _orders(self, pair: Pair) -> tuple["_Order", "_Order"]:
         """Either explanation as the true one; what doesn't depend on the motion is worked out once."""
         if pair not in self._known:
-            named, rival = (pair.named, pair.named_sets), (pair.rival, pair.rival_sets)
+            named, rival = pair.named_sets, pair.rival_sets
             self._known[pair] = self._order_of(pair, named, rival), self._order_of(pair, rival, named)
         return self._known[pair]
 
-    def _order_of(self, pair: Pair, true: tuple[str, Sets], other: tuple[str, Sets]) -> "_Order":
+    def _order_of(self, pair: Pair, true: Sets, other: Sets) -> "_Order":
         rest = np.concatenate([self._always, *(self._columns[c] for c in pair.rest)])
         own = lambda sets: [np.concatenate([self._columns[c] for c in s]) for s in sets]  # noqa: E731
-        truths, others = own(true[1]), own(other[1])
+        truths, others = own(true), own(other)
         old, _ = eliminated(self.open.gram, rest)
         best = max(truths, key=lambda columns: gain_of(old, columns))
         columns = np.concatenate([rest, best])
         # Of the whole matrix only what either explanation uses is needed.
         kept = np.unique(np.concatenate([rest, *truths, *others]))
         at = lambda columns: np.searchsorted(kept, columns)  # noqa: E731
-        feigned = max(CATALOGUE[slug].feigned for slug in (true[0], other[0])) ** 2
-        # A special case stands until the law that contains it has beaten that.
-        feigned = -feigned if true[0] in CATALOGUE[other[0]].contains else feigned
         weights = posterior(self.open.gram, columns).mean
         known = self.open.gram[np.ix_(np.append(kept, -1), np.append(kept, -1))]
         own_at = at(rest), at(best), [*map(at, truths)], [*map(at, others)]
-        return _Order(kept, known, columns, weights, *own_at, feigned)
+        return _Order(kept, known, columns, weights, *own_at)
 
     def _odds_if_true(self, added: np.ndarray, o: "_Order", exact: bool) -> float:
         H = o.known.copy()
@@ -110,7 +108,7 @@ class Questions:
         mean = posterior(left, o.best).mean
         explained = 0.0 if exact else 0.5 * float(mean @ H[np.ix_(o.best, o.best)] @ mean)
         gain = lambda sets: max(gain_of(left, s) for s in sets)  # noqa: E731
-        return gain(o.truths) - gain(o.others) - o.feigned * explained
+        return gain(o.truths) - gain(o.others) - USUAL**2 * explained
 
     def visible(self, added: np.ndarray, columns: Sequence[int]) -> np.ndarray:
         """Standard deviations by which effects, at the strength of `testable`, would stand out; one for each column."""
@@ -134,7 +132,6 @@ class _Order(NamedTuple):
         rest: Columns of both explanations.
         best: Columns of the true one alone at its best shape.
         truths, others: Columns of the true and of the other one alone, for every shape.
-        feigned: Share of what is explained that an imperfect law could feign, squared; below zero in its favour.
     """
 
     kept: np.ndarray
@@ -145,7 +142,6 @@ class _Order(NamedTuple):
     best: np.ndarray
     truths: list[np.ndarray]
     others: list[np.ndarray]
-    feigned: float
 
 
 def _library(robot: Robot, open_: Undecided) -> tuple[Library, np.ndarray]:

@@ -58,12 +58,6 @@ class Stretch:
         own = np.where(columns < k, columns, columns - (self.X.shape[-1] - k))
         return dataclasses.replace(self, X=self.rigid[..., own], y=self.tau - self.nominal, bare=True)
 
-    def stripped(self) -> "Stretch":
-        """With inertials as they are without any explanation, X and y of the same shapes."""
-        k = self.rigid.shape[-1]
-        X = np.concatenate([self.rigid, self.X[..., k:-k], self.rigid], axis=-1)
-        return dataclasses.replace(self, X=X, y=self.tau - self.nominal, bare=True)
-
 
 def stretch(
     lib: Library, along: Prepared, index: int, band: Band, factor: np.ndarray, loads: Loads | None = None,

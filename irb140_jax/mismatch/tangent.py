@@ -1,4 +1,4 @@
-"""Where the columns are taken: what was found of gravity and of the log multiplies all other unknowns.
+"""Where the regression is linearised: what was found of gravity and of the log multiplies all other unknowns.
 
 Two products of unknowns are too large to be left to the next round.  Gravity that leans shows the centres of mass of
 links behind a vertical axis, which upright gravity does not: without it, what a wrong centre of mass does there has to

@@ -114,7 +114,7 @@ def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, i
     Returns:
         Standard deviations and index of the candidate that stands out most.
     """
-    H, _ = eliminated(ex.problem.H, ex.problem.columns(ex.chosen))
+    H = ex.near(ex.chosen, np.arange(len(ex.data.scale) - ex.data.nuisances))
     seen: dict[Site, tuple[float, int]] = {}
     for i, c in enumerate(ex.data.candidates):
         if c.effect.silent or any(_related(c, m) for m in ex.members):
@@ -123,7 +123,7 @@ def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, i
             continue  # a wall or a push at no place or time in particular
         scale = ex.data.scale[ex.data.nuisances + c.columns]
         strength = matters.in_prior_units(c.columns, scale)
-        z = stands_out(H, c, c.columns + ex.problem.offset, strength, ex.members)
+        z = stands_out(H, c, c.columns, strength, ex.members)
         if z >= seen.get((c.slug, c.joints), (-1.0, 0))[0]:
             seen[c.slug, c.joints] = z, i
     return seen

@@ -10,9 +10,10 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.assemble import TYPICAL_SHARE
 from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.evidence import eliminated
 from irb140_jax.mismatch.explanation import Explanation
+from irb140_jax.mismatch.regression.gram import LEVELS
 from irb140_jax.mismatch.testable import REFERENCE_SHARE, VISIBLE, Reference, Site
 from irb140_jax.recordings.low_pass import Band
 
@@ -132,11 +133,12 @@ def undecided(
     chosen = table.of(physics)
     hidden = table.of(i for z, i in seen.values() if z < VISIBLE)
     table.of(i for _, i in seen.values())
-    links = tuple(ex.data.candidates[c].joints[0] for c in loose)
+    links = tuple(j for c in loose for j in ex.data.candidates[c].joints)
     gram, scale, strength = table.gram(ex, loose, matters)
     # A joint that never moved told nothing of its noise.
-    still = ex.grams.rows.sum(axis=0) == 0
-    level = np.where(still, UNKNOWN_NOISE * matters.torque, np.median(ex.noise.level, axis=0))
+    still = np.array([g.rows.sum() == 0 for g in ex.space.joints])
+    times = [LEVELS[s[-1]] for s in ex.settings]
+    level = np.where(still, UNKNOWN_NOISE * matters.torque, np.median(ex.noise.level, axis=0) * times)
     return Undecided(
         tuple(table.columns), chosen, links, made, hidden, gram, scale, strength, uncertainty, ex.noise.ar, level,
         band, ex.scales,
@@ -173,15 +175,21 @@ class _Table:
         nuisances = ex.data.nuisances
         parts = [ex.data.candidates[i].columns for i in self._numbers]
         amplitudes = np.concatenate(parts) if parts else np.zeros(0, dtype=int)
-        H = ex.grams.total()
-        index = np.concatenate(
-            [np.arange(nuisances), ex.problem.columns(loose), nuisances + amplitudes, [H.shape[0] - 1]]
-        )
+        space = ex.space
+        index = space.with_y(np.concatenate(
+            [np.arange(space.offset), *(space.columns[c] for c in loose), space.offset + amplitudes]
+        ))  # fmt: skip
+        instrument = np.arange(nuisances, space.offset)
+        H, _ = eliminated(space.gram(ex.settings, index, index), instrument)
+        H = np.delete(np.delete(H, instrument, axis=0), instrument, axis=1)
         # What these recordings don't excite has no prior scale of theirs: that of lively motion stands in.
-        likely = TYPICAL_SHARE / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
+        typical = np.concatenate([np.zeros(0), *(
+            np.full(len(self._candidates[i].columns), self._candidates[i].effect.typical) for i in self._numbers
+        )])  # fmt: skip
+        likely = typical / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
         scale = ex.data.scale[nuisances + amplitudes]
         scale = np.where(matters.in_prior_units(amplitudes, scale) == 0.0, likely, scale)
-        return H[np.ix_(index, index)], scale, matters.in_prior_units(amplitudes, scale)
+        return H, scale, matters.in_prior_units(amplitudes, scale)
 
 
 def _key(c: Candidate) -> tuple[str, tuple[int, ...]]:
@@ -199,10 +207,12 @@ def _rival(ex: Explanation, at: int, slug: str, loose: tuple[int, ...]) -> tuple
     ]  # fmt: skip
     best, found = -np.inf, None
     for beside in ((), *((s,) for s in special)):
-        scores = ex.problem.scores((*rest, *beside), c.joints) + ex.problem.odds(rest, beside)
-        for i in np.flatnonzero(np.isfinite(scores)):
-            if ex.data.candidates[i].slug == slug and i not in rest and scores[i] > best:
-                best, found = float(scores[i]), (int(i), *beside)
+        which = [i for i, o in enumerate(ex.data.candidates)
+                 if o.slug == slug and set(o.joints) & set(c.joints) and i not in rest]  # fmt: skip
+        base = float(ex.gains(rest, beside)[0]) if beside else 0.0
+        for i, gain in zip(which, ex.gains((*rest, *beside), which), strict=True):
+            if base + gain > best:
+                best, found = base + float(gain), (int(i), *beside)
     return found
 
 

@@ -1,7 +1,8 @@
 """Structure that no effect of the library explains: flexible competitors, scored on data that they did not see.
 
 Each competitor knows one group of variables: the joint's position and speed, its load, its past, another joint, time.
-If one of them predicts what the findings leave, something is left out, and its variables say where.
+If one of them predicts what the findings leave, something is left out, and its variables say where.  No finding is
+changed by it.
 """
 
 import dataclasses
@@ -10,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from irb140_jax.mismatch.explanation import Explanation, full_posterior, parts
+from irb140_jax.mismatch.explanation import Explanation
 from irb140_jax.mismatch.noise import spread
-from irb140_jax.mismatch.prove import HeldOut, held_out_gain
+from irb140_jax.mismatch.prove import HeldOut
 from irb140_jax.mismatch.rows import Stretch
 
 FEATURES = 60  # random Fourier features a competitor
@@ -28,13 +29,6 @@ MOTION_BLOCK = 2.5  # s left out together
 RIDGES = (0.001, 0.03, 1.0)  # of the features' variance; the best one counts, in the null as well
 TIME_BAND = 1.0  # Hz up to which the competitor of time follows
 TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
-BELITTLED = 0.16  # size of a nameless structure, over that of a finding, from which the finding may be a part of it ...
-NO_WORSE = 0.2  # ... if its competitor errs by at most so much more without the finding, times that ratio
-BETTER = 0.95  # and without any finding: where it distorts what is simple without it
-SAME = 0.9  # of a rarer finding's variance, from which the structure's variables are the finding's own
-LITTLE = 0.25  # of the unseen error: ordinary friction that removes less of it ...
-LARGE = 0.4  # ... and leaves so much of its own size without a name is not what that joint has
-ALMOST_ALL = 0.8
 NEARLY = 2.0 / 3.0
 
 
@@ -48,7 +42,6 @@ class Unexplained:
         p_value: Share of time-shifted copies that are as predictable.
         variable: The variables that carry it, in words.
         rms: Size of the predictable part [N m or N].
-        doubtful: Findings (candidate indices) that this structure's own variables make superfluous.
     """
 
     joint: int
@@ -56,7 +49,6 @@ class Unexplained:
     p_value: float
     variable: str
     rms: float
-    doubtful: tuple[int, ...]
 
 
 class Competitor(NamedTuple):
@@ -99,7 +91,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
     """Joints whose residual, findings taken off, can be predicted on unseen data."""
     out = []
     torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
-    rmse = proof.rmse(proof.corrected)
+    rmse = proof.rmse(proof.named)
     for j in range(len(torque)):
         rows = _rows(ex, proof, j)
         least = max(MATERIAL_SHARE, (MATERIAL_TORQUE * torque[j] / max(rmse[j], 1e-100)) ** 2)
@@ -118,8 +110,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
             p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
             if share >= least and p <= SIGNIFICANT:
                 size = float(np.sqrt(share) * rmse[j])
-                doubtful = _doubtful(ex, j, rows, rivals[best], size)
-                out.append(Unexplained(j, share, p, rivals[best].variable, size, doubtful))
+                out.append(Unexplained(j, share, p, rivals[best].variable, size))
                 break
     return out
 
@@ -173,7 +164,7 @@ def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
         for r, (s, p) in enumerate(zip(ex.data.stretches, pick, strict=True))
     ])  # fmt: skip
     recording = np.repeat(np.arange(len(pick)), [p.sum() for p in pick])
-    y = np.concatenate([c[p, j] for c, p in zip(proof.corrected, pick, strict=True)]) / level
+    y = np.concatenate([c[p, j] for c, p in zip(proof.named, pick, strict=True)]) / level
     if len(y):
         limit = 6.0 * np.median(np.abs(y)) + 1e-12
         y = np.clip(y - np.mean(y), -limit, limit)
@@ -261,41 +252,3 @@ def _null(rivals: list[Competitor], rows: Rows) -> np.ndarray:
         for k in range(SHIFTS):
             copies[at, k] = np.roll(rows.residual[at], rng.integers(len(at) // 10, max(len(at) - len(at) // 10, 2)))
     return np.max([predicted(c, copies) for c in rivals if c.shifts], axis=0)
-
-
-def _centred(y: np.ndarray, constant: np.ndarray) -> np.ndarray:
-    """Without its part along a constant torque: any structure may have a mean, and no competitor is asked for it."""
-    return y - constant * (constant @ y) / (constant @ constant)
-
-
-def _doubtful(ex: Explanation, j: int, rows: Rows, carrier: Competitor, size: float) -> tuple[int, ...]:
-    """Findings that only stand in for the structure, smallest first, each on top of those before.
-
-    Its variables predict as well without them; or they are rarer laws that leave more than they name, or so much in
-    their own variables that the form must be another; or ordinary friction that leaves much and hardly helps on unseen
-    data.  Dry and viscous friction come together: where another law of friction is named at the joint, ordinary
-    friction is there, and in doubt only if it makes the structure harder to predict.
-    """
-    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
-    w, torques = post.mean * ex.data.scale[post.columns], {}
-    for index, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
-        torque = [s.X[..., post.columns[part]] @ w[part] for s in ex.data.stretches]
-        energy = np.sum([np.sum((x / ex.noise.total[r]) ** 2, axis=0) for r, x in enumerate(torque)], axis=0)
-        if not ex.data.candidates[index].effect.silent and energy[j] > ALMOST_ALL * energy.sum():
-            torques[index] = rows.of([x[:, j] for x in torque])
-    out, y = [], rows.residual
-    for index in sorted(torques, key=lambda i: float(np.sum(torques[i] ** 2))):
-        level = 1.0 / rows.level
-        own, without = (_centred(x, level) for x in (torques[index] * level, y + torques[index] * level))
-        ratio = size / np.sqrt(np.mean(torques[index] ** 2))
-        error = _missed(carrier, without[:, None])[0] / _missed(carrier, y[:, None])[0]
-        form = ratio > 1.0 or predicted(carrier, own[:, None])[0] > SAME
-        law = ex.data.candidates[index].effect
-        sure = law.ordinary and any(ex.data.candidates[i].effect.friction for i in torques if i != index)
-        form = form if not law.ordinary else ratio > LARGE and held_out_gain(ex, index)[0] < LITTLE
-        if error < BETTER or (
-            not sure and ratio > BELITTLED and (form or error < 1.0 + NO_WORSE * min(ratio, 1.0))
-        ):
-            out.append(index)
-            y = without
-    return tuple(out)

@@ -6,7 +6,8 @@ import numpy as np
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.consistent import consistent
-from irb140_jax.mismatch.explanation import Explanation, fitted, full_posterior
+from irb140_jax.mismatch.evidence import eliminated, gain_of
+from irb140_jax.mismatch.explanation import Explanation, fitted
 from irb140_jax.mismatch.prove import HeldOut
 from irb140_jax.mismatch.unknown import Unexplained
 from irb140_jax.robot import Robot
@@ -36,12 +37,13 @@ def verdict(
 
 def _inertials_matter(ex: Explanation) -> bool:
     """Whether refitted inertials are clearly more probable than the nominal ones."""
-    H, k = ex.grams.total(), ex.data.nuisances
     if any(ex.data.candidates[c].slug == "inertials" for c in ex.chosen):
         return True
-    M = H[:k, :k] + np.eye(k)
-    gain = 0.5 * H[:k, -1] @ np.linalg.solve(M, H[:k, -1]) - 0.5 * np.linalg.slogdet(M)[1]
-    return bool(gain > NO_BETTER)
+    space, instrument = ex.space, np.arange(ex.space.inertials, ex.space.offset)
+    every = space.with_y(np.concatenate([instrument, np.arange(space.inertials)]))
+    H = space.gram(ex.settings, every, every)
+    left, _ = eliminated(H, np.arange(len(instrument)))
+    return gain_of(left, len(instrument) + np.arange(space.inertials)) > NO_BETTER
 
 
 def inertial_views(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
@@ -50,11 +52,11 @@ def inertial_views(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     A torque does not show a link's mass but sums over links (base parameters); so a sentence says by what torque the
     refitted inertials differ, and a mass is given only where the data know it, of a body that can be.
     """
-    post = full_posterior(ex.data, ex.problem, ex.grams, ex.chosen)
+    post = ex.posterior()
     dphi, _, _ = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)
     possible = consistent(phi + dphi.reshape(-1, 10), phi)
-    loose = {ex.data.candidates[c].joints[0] for c in ex.chosen if ex.data.candidates[c].slug == "inertials"}
+    loose = {j for m in ex.members if m.slug == "inertials" for j in m.joints}
     uncertainty = ex.data.scale[0] if ex.data.nuisances else 0.05
     known = _masses_known(ex, post.cov)
     out = []

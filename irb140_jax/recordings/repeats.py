@@ -37,7 +37,7 @@ def with_motions_numbered(
     for m in dict.fromkeys(motion):
         names = [r.source for r, own in zip(recordings, motion, strict=True) if own == m]
         if len(names) > 1:
-            notes.append(f"{', '.join(names)} repeat one motion: together they count as evidence once.")
+            notes.append(f"{', '.join(names)} repeat one motion: they count as one recording whose noise is averaged.")
     numbered = zip(smooth, motion, repeats, strict=True)
     return [dataclasses.replace(r, motion=m, repeats=k) for r, m, k in numbered], notes
 

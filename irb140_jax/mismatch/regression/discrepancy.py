@@ -9,6 +9,9 @@ Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(
 and Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
 """
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 
 from irb140_jax.effects import Scales
@@ -19,10 +22,50 @@ ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which a sign is rou
 LATE = (-0.01, -0.005, 0.005, 0.01, 0.02)  # s by which friction turns before or after the joint
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
+FEATURES = 82  # of both blocks
+
+
+@dataclasses.dataclass(frozen=True)
+class Discrepancy:
+    """What a corrected model adds, on some joints, to what its laws say: torque without a name.
+
+    Attributes:
+        scales: Sizes of the recordings that it was found in.
+        coefficients: Of each joint's smooth and reversal features [N m or N], zero where nothing is carried, shape
+            (n, FEATURES).
+    """
+
+    scales: Scales
+    coefficients: np.ndarray
+
+    def along(self, r: Conditioned, load: np.ndarray) -> np.ndarray:
+        """Its torque along a motion, shape (T, n) [N m or N].
+
+        Args:
+            r: T samples of n joints.
+            load: Torque that the transmissions carry [N m or N], shape (T, n).
+        """
+        out = np.zeros_like(load)
+        for j in np.flatnonzero(self.coefficients.any(axis=1)):
+            features = [f(r, load, self.scales, int(j)) for f in (smooth_features, reversal_features)]
+            out[:, j] = np.concatenate(features, axis=1) @ self.coefficients[j]
+        return out
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything of it as JSON."""
+        sizes = {k: np.asarray(v).tolist() for k, v in self.scales._asdict().items()}
+        return {"scales": sizes, "coefficients": self.coefficients.tolist()}
+
+    @staticmethod
+    def from_json(data: dict[str, Any]) -> "Discrepancy":
+        """The inverse of `to_json`."""
+        sizes: dict[str, Any] = {k: np.array(v, dtype=float) if isinstance(v, list) else float(v)
+                                 for k, v in data["scales"].items()}  # fmt: skip
+        return Discrepancy(Scales(**sizes), np.array(data["coefficients"], dtype=float))
 
 
 def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
-    """Smooth functions of one joint's state, shape (T, 41).
+    """Smooth functions of one joint's state, shape (T, 37).
 
     Args:
         r: T samples of n joints.
@@ -37,17 +80,19 @@ def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) ->
     fast = 1.0 + 2.0 * np.log(np.abs(r.qd[:, j]) / scales.speed[j] + 1e-3) / np.log(1e3)
     speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
     turned, even = direction[:, None], np.abs(carried)[:, None]
+    # Of friction that grows with load only how it bends: in proportion is a law of its own.
+    bend = even**2 - even * np.sum(even**3) / max(float(np.sum(even**2)), 1e-300)
     parts = [
         position[:, 1:], turned * position, turned * speed, speed,
         (turned * speed)[:, :, None] * position[:, None, :2],
-        turned * even, turned * even**2, (carried**2)[:, None], carried[:, None] * position[:, :2],
+        turned * bend, (carried**2)[:, None], carried[:, None] * position[:, :2],
         turned * even * position[:, :2], turned * even * speed,
     ]  # fmt: skip
     return np.concatenate([p.reshape(len(x), -1) for p in parts], axis=1)
 
 
 def reversal_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
-    """What happens around one joint's reversals and along its slopes, shape (T, 41); arguments as above."""
+    """What happens around one joint's reversals and along its slopes, shape (T, 45); arguments as above."""
     q, qd, qdd, dt = r.q[:, j], r.qd[:, j], r.qdd[:, j], float(np.mean(np.diff(r.t)))
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
@@ -59,7 +104,9 @@ def reversal_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) 
     carried = np.abs(load[:, j]) / max(float(scales.torque[j]), 1e-12)
     pushed = np.abs(qdd) / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
     slopes = np.stack([np.gradient(load[:, j], dt), np.gradient(qdd, dt)], axis=1)
-    return np.concatenate([X, X * carried[:, None], X * pushed[:, None], slopes], axis=1)
+    # What differs by direction may go on through a reversal, or vanish there.
+    even = np.stack([np.abs(np.tanh(qd / (share * scales.speed[j]))) - 1.0 for share in ROUNDED], axis=1)
+    return np.concatenate([X, X * carried[:, None], X * pushed[:, None], slopes, even], axis=1)
 
 
 def _relaxed(q: np.ndarray, travel: float) -> np.ndarray:

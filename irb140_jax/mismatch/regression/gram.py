@@ -1,26 +1,32 @@
 """Gram matrices of every joint, and what is left of them once its nuisance parameters are integrated out.
 
-With whitened rows y = Z z + E_j e + X w + noise of unit variance times the level, own nuisances e of joint j touch its
-rows only.  For given sizes of the discrepancy they are integrated out joint by joint, which leaves a small matrix over
-inertials, effects and y; sums of those over joints are all that a search needs.
+With whitened rows y = Z z + E_j e + X w + noise, z are inertials and common nuisance parameters, w the amplitudes of
+effects.  The own nuisance parameters e of joint j, its discrepancy among them, appear in the rows of that joint only.
+For given sizes of the discrepancy they are integrated out joint by joint.  That leaves a small matrix over inertials,
+effects and y; sums of those over joints are all that a search needs.
 """
 
 import dataclasses
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 from scipy import linalg
 
 from irb140_jax.mismatch.assemble import Data
-from irb140_jax.mismatch.noise import Noise
+from irb140_jax.mismatch.noise import Noise, correlation_time
 from irb140_jax.mismatch.regression.nuisances import SCALED, Nuisances
 
-SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)  # of a block, as a share of the joint's torque
+SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1)  # of a block, as a share of the joint's torque
 USUAL = 0.03  # share of the torque that laws are usually wrong by: scale of the half-Cauchy prior
-LEVELS = tuple(1.25**k for k in range(0, 24))  # noise over the sensors' level
-REMEMBERED = 128  # factors of a joint
+ONE = 24  # index of the level at which the noise is as it was estimated
+LEVELS = tuple(1.25 ** (k - ONE) for k in range(2 * ONE))  # noise over what was estimated
+REMEMBERED = 192  # settings of a joint that are kept: a quarter of a megabyte each
 
 Setting = tuple[int, ...]  # indices into SIZES for each block of SCALED, and into LEVELS
+
+START: Setting = (*([3] * len(SCALED)), ONE)
 
 
 def log_prior(setting: Setting) -> float:
@@ -32,18 +38,57 @@ def log_prior(setting: Setting) -> float:
 
 
 @dataclasses.dataclass(frozen=True)
-class Factor:
-    """What integrating out a joint's own nuisances takes, at some sizes and a noise level.
+class Integrated:
+    """A joint's rows at some sizes of the discrepancy and a noise level, its own nuisances integrated out.
 
     Attributes:
-        half: What integrating them out takes off the Gram matrix of shared columns and y, half.T @ half, (D, k + 1).
-        level: Noise over the sensors' level.
-        constant: What this adds to the log evidence: log determinants, noise level and prior of the sizes.
+        gram: Gram matrix over [own | shared | y], of which the own columns are not yet integrated out, at level 1.
+        level: Noise level.
+        used: Own columns that may differ from zero.
+        scale: Their prior standard deviations.
+        chol: Cholesky factor of their precision, in units of those.
+        half: What integrating them out takes off the Gram matrix of shared columns and y, half.T @ half.
+        constant: What the joint adds to the log evidence besides: log determinants, noise level and prior of the sizes.
     """
 
-    half: np.ndarray
+    gram: np.ndarray
     level: float
+    used: np.ndarray
+    scale: np.ndarray
+    chol: np.ndarray
+    half: np.ndarray
     constant: float
+
+    def left(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Gram matrix of some shared columns with others, as numbered in `JointGram.index`."""
+        first = len(self.gram) - self.half.shape[1]
+        square = self.gram[np.ix_(rows + first, columns + first)] / self.level**2
+        return square - self.half[:, rows].T @ self.half[:, columns]
+
+    def blocks(self, groups: np.ndarray) -> np.ndarray:
+        """Such Gram matrices of small groups of columns (m, k), shape (m, k, k); -1 stands for a column of zeros."""
+        at, there = groups + len(self.gram) - self.half.shape[1], groups >= 0
+        G = self.gram[at[:, :, None], at[:, None, :]] / self.level**2
+        part = np.moveaxis(self.half[:, groups], 0, 1)
+        G = G - np.swapaxes(part, 1, 2) @ part
+        return np.where(there[:, :, None] & there[:, None, :], G, 0.0)
+
+    def own(self) -> np.ndarray:
+        """Mean of the own columns per unit of each shared column and of y, shape (D, k + 1)."""
+        out = np.zeros((len(self.gram) - self.half.shape[1], self.half.shape[1]))
+        out[self.used] = self.scale[:, None] * linalg.solve_triangular(self.chol, self.half, lower=True, trans=1)
+        return out
+
+    def spread(self) -> np.ndarray:
+        """Standard deviation of the own columns' coefficients beside shared ones that are known, shape (D,)."""
+        out = np.zeros(len(self.gram) - self.half.shape[1])
+        inverse = linalg.solve_triangular(self.chol, np.eye(len(self.used)), lower=True)
+        out[self.used] = self.scale * np.sqrt(np.sum(inverse**2, axis=0))
+        return out
+
+    def dof(self) -> float:
+        """How many of the own columns the rows determine."""
+        return float(len(self.used) - np.sum((self.spread()[self.used] / self.scale) ** 2))
 
 
 class JointGram:
@@ -54,53 +99,76 @@ class JointGram:
         blocks: Gram matrices over [own | shared | y] in prior units, shape (B, D + k + 1, D + k + 1).
         groups: Block of each own column, see `Nuisances`.
         rows: Rows of each block, shape (B,).
+        repeats: How many recordings there are of each block's motion, shape (B,).
+        misfit: Share of the noise's variance, at level 1, that the sensors don't make.
     """
 
-    def __init__(self, index: np.ndarray, blocks: np.ndarray, groups: np.ndarray, rows: np.ndarray):
-        self.index, self.blocks, self.groups, self.rows = index, blocks, groups, rows
-        self.total = blocks.sum(axis=0)
-        self._factors: dict[Setting, Factor] = {}
+    def __init__(
+        self, index: np.ndarray, blocks: np.ndarray, groups: np.ndarray, rows: np.ndarray,
+        repeats: np.ndarray | None = None, misfit: float = 0.0,
+    ):  # fmt: skip
+        self.index, self.blocks, self.groups, self.rows, self.misfit = index, blocks, groups, rows, misfit
+        self.repeats = np.ones(len(blocks), dtype=int) if repeats is None else repeats
+        least = np.sqrt(1.0 - misfit)  # no residual is quieter than the sensors
+        self.lowest = int(np.searchsorted(LEVELS, least * (1.0 - 1e-9)))
+        self._totals = [(int(k), blocks[self.repeats == k].sum(axis=0), float(rows[self.repeats == k].sum()))
+                        for k in np.unique(self.repeats)]  # fmt: skip
+        self._once = (self._totals[0][1], self._totals[0][2]) if self._totals else (blocks.sum(axis=0), 0.0)
+        self._kept: dict[tuple[Setting, bool], Integrated] = {}
 
-    def factor(self, setting: Setting) -> Factor:
-        """See `Factor`; kept, for a search asks for the same ones thousands of times."""
-        if setting not in self._factors:
-            if len(self._factors) >= REMEMBERED:
-                self._factors.pop(next(iter(self._factors)))
-            self._factors[setting] = self._factor(setting)
-        return self._factors[setting]
+    def without(self, blocks: np.ndarray) -> "JointGram":
+        """The same without some blocks, shape (B,)."""
+        keep = ~blocks
+        return JointGram(
+            self.index, self.blocks[keep], self.groups, self.rows[keep], self.repeats[keep], self.misfit
+        )
 
-    def _factor(self, setting: Setting) -> Factor:
-        level, size = LEVELS[setting[-1]], own_scale(self.groups, setting)
-        used = np.flatnonzero(size > 0.0)
-        s = size[used]
-        M = s[:, None] * self.total[np.ix_(used, used)] * s / level**2 + np.eye(len(used))
-        chol = linalg.cholesky(M, lower=True)
-        D = len(self.groups)
-        half = linalg.solve_triangular(chol, s[:, None] * self.total[used, D:] / level**2, lower=True)
-        left = self.total[-1, -1] / level**2 - half[:, -1] @ half[:, -1]
-        constant = -float(np.log(np.diag(chol)).sum()) - float(self.rows.sum()) * np.log(level) - 0.5 * left
-        return Factor(half, level, constant + log_prior(setting))
+    def weighted(self, level: float) -> tuple[np.ndarray, float]:
+        """Sum of the blocks and their number of rows, each motion that was repeated by what its repeats are worth.
 
-    def left(self, setting: Setting, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Gram matrix of some shared columns with others, own nuisances integrated out; numbered as in `index`."""
-        f, D = self.factor(setting), len(self.groups)
-        return self.total[np.ix_(rows + D, columns + D)] / f.level**2 - f.half[:, rows].T @ f.half[:, columns]
+        Sensor noise averages out over k repeats of a motion, what a model errs by comes back with it: their mean has
+        the variance s^2 / k + m^2 where one has s^2 + m^2.
 
-    def own(self, setting: Setting, groups: np.ndarray) -> np.ndarray:
-        """Such Gram matrices of many small groups of columns; -1 stands for one that does not move this joint.
+        Args:
+            level: Noise over that at which `misfit` is stated.
+        """
+        if all(k == 1 for k, *_ in self._totals):
+            return self._once
+        total, rows = 0.0, 0.0
+        for k, gram, count in self._totals:
+            square = level**2
+            sensors = 1.0 - self.misfit
+            worth = square / (sensors / k + square - sensors) / k
+            total, rows = total + worth * gram, rows + worth * count
+        return np.asarray(total), rows
+
+    def at(self, setting: Setting, instrument: bool = True) -> Integrated:
+        """Own nuisances integrated out; kept, for a search asks for the same ones thousands of times.
 
         Args:
             setting: Sizes and level.
-            groups: Shape (m, k).
-
-        Returns:
-            Shape (m, k, k).
+            instrument: Whether the instrument may err within its stated widths; otherwise it is taken to be right.
         """
-        f, at, there = self.factor(setting), groups + len(self.groups), groups >= 0
-        G = self.total[at[:, :, None], at[:, None, :]] / f.level**2
-        part = f.half[:, groups]
-        G = G - np.einsum("amk,aml->mkl", part, part, optimize=True)
-        return np.where(there[:, :, None] & there[:, None, :], G, 0.0)
+        key = setting, instrument
+        if key not in self._kept:
+            if len(self._kept) >= REMEMBERED:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[key] = self._integrated(setting, instrument)
+        else:
+            self._kept[key] = self._kept.pop(key)  # most recently used last
+        return self._kept[key]
+
+    def _integrated(self, setting: Setting, instrument: bool) -> Integrated:
+        level, size, D = LEVELS[setting[-1]], own_scale(self.groups, setting), len(self.groups)
+        used = np.flatnonzero((size > 0.0) & (instrument | (self.groups >= 0)))
+        total, rows = self.weighted(level)
+        s = size[used]
+        M = s[:, None] * total[np.ix_(used, used)] * s / level**2 + np.eye(len(used))
+        chol = linalg.cholesky(M, lower=True, check_finite=False)
+        half = linalg.solve_triangular(chol, s[:, None] * total[used, D:] / level**2, lower=True, check_finite=False)
+        left = total[-1, -1] / level**2 - half[:, -1] @ half[:, -1]
+        constant = -float(np.log(np.diag(chol)).sum()) - rows * np.log(level) - 0.5 * left
+        return Integrated(total, level, used, s, chol, half, constant + log_prior(setting))
 
 
 def own_scale(groups: np.ndarray, setting: Setting) -> np.ndarray:
@@ -109,7 +177,9 @@ def own_scale(groups: np.ndarray, setting: Setting) -> np.ndarray:
     return sizes[groups + 1]
 
 
-def joint_grams(data: Data, extra: Sequence[Nuisances], noise: Noise, blocks: int = 1) -> tuple[JointGram, ...]:
+def joint_grams(
+    data: Data, extra: Sequence[Nuisances], noise: Noise, blocks: int = 1, sensors: np.ndarray | None = None
+) -> tuple[JointGram, ...]:
     """Whiten the rows and form the Gram matrices of every joint.
 
     Shared columns are [inertials | common nuisances | amplitudes | loose inertials], in prior units.
@@ -117,19 +187,27 @@ def joint_grams(data: Data, extra: Sequence[Nuisances], noise: Noise, blocks: in
     Args:
         data: Low-passed rows.
         extra: Nuisance columns, one per recording.
-        noise: Sensors' noise.
+        noise: Of the rows.
         blocks: Contiguous blocks per recording.
+        sensors: What of the noise the sensors make, shape (n,) [N m or N]; all of it by default.
     """
-    return tuple(_joint_gram(data, extra, noise, blocks, j) for j in range(data.stretches[0].y.shape[1]))
+    total = np.sqrt(np.mean(noise.total**2, axis=0))
+    misfit = np.zeros(len(total)) if sensors is None else 1.0 - np.minimum(sensors / total, 1.0) ** 2
+    form = partial(_joint_gram, data, extra, noise, blocks, misfit)
+    # Joints side by side: nearly all of the time is in products, and those hold no lock.
+    with ThreadPoolExecutor() as threads:
+        return tuple(threads.map(form, range(len(total))))
 
 
-def _joint_gram(data: Data, extra: Sequence[Nuisances], noise: Noise, blocks: int, j: int) -> JointGram:
+def _joint_gram(
+    data: Data, extra: Sequence[Nuisances], noise: Noise, blocks: int, misfit: np.ndarray, j: int
+) -> JointGram:
     k, common = data.nuisances, extra[0].common.shape[-1]
     moves = np.any([np.any(s.X[:, j] != 0.0, axis=0) for s in data.stretches], axis=0)
     active = np.flatnonzero(moves & (data.scale > 0.0))
     inertial, amplitude = active[active < k], active[active >= k]
     index = np.concatenate([inertial, k + np.arange(common), amplitude + common, [len(data.scale) + common]])
-    out, count = [], []
+    out, count, repeats = [], [], []
     for s, e in zip(data.stretches, extra, strict=True):
         X = s.X[:, j]
         A = np.concatenate([
@@ -142,7 +220,24 @@ def _joint_gram(data: Data, extra: Sequence[Nuisances], noise: Noise, blocks: in
             part = A[block][usable[block]]
             out.append(part.T @ part)
             count.append(len(part))
-    return JointGram(index, np.stack(out), extra[0].groups[j], np.array(count))
+            repeats.append(s.repeats)
+    alike = rows_alike(data, noise, misfit, j)
+    grams, rows = np.stack(out) / alike, np.array(count) / alike
+    return JointGram(index, grams, extra[0].groups[j], rows, np.array(repeats), float(misfit[j]))
 
 
-START: Setting = (*([3] * (len(SCALED) - 1)), 3, 0)
+def rows_alike(data: Data, noise: Noise, misfit: np.ndarray, j: int) -> float:
+    """How many rows of a joint count as one observation.
+
+    Sensor noise is independent from row to row.  What a law errs by is a function of the joint's state and stays the
+    same for as long as its speed does; and the residual shows for how many rows it stays the same at least.
+
+    Args:
+        data: Low-passed rows.
+        noise: Of the rows.
+        misfit: Share of the noise's variance that the sensors don't make, shape (n,).
+        j: The joint.
+    """
+    speed = [s.qd[:, j] - np.mean(s.qd[:, j]) for s in data.stretches]
+    return max(float(noise.alike[j]), 1.0 + float(misfit[j]) * (correlation_time(speed) - 1.0))
+

@@ -1,4 +1,4 @@
-"""Nuisance parameters: what every log may be wrong by, with stated prior widths, and the model discrepancy."""
+"""Columns of errors of the instrument, nuisance parameters with stated prior widths, and of the discrepancy."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -15,6 +15,7 @@ GAIN_COMMON, GAIN_JOINT = 0.10, 0.03  # torque scale of all joints, and of each 
 DELAY_COMMON, DELAY_JOINT = 1e-3, 5e-4  # s between torque and position channels
 SMOOTHED = 2e-5  # s^2 of the torque's second derivative: what smoothing takes off accelerations that noise hides
 ROTOR = 0.10  # of the stated armature
+FIXED = ("gain", "delay", "rotor", "smoothing")  # a joint's own columns with stated widths, in their order
 SCALED = ("smooth", "reversal", "slope")  # blocks of a joint whose size is learned from the recordings
 
 
@@ -23,14 +24,30 @@ class Nuisances:
     """Columns of one recording beside inertials and effects, low-passed rows as in `Stretch`, in prior units.
 
     Attributes:
-        common: Torque scale and delay of all joints, shape (R, n, 2).
+        common: Torque scale, delay and smoothing of all joints, shape (R, n, 3).
         own: Of each joint, fixed widths first, then the blocks `SCALED`; shape (R, D_j) each.
         groups: Which block each own column belongs to: -1 fixed, else an index into `SCALED`; shape (D_j,) each.
+        units: What each own column's feature was multiplied by, shape (D_j,) each.
     """
 
     common: np.ndarray
     own: tuple[np.ndarray, ...]
     groups: tuple[np.ndarray, ...]
+    units: tuple[np.ndarray, ...]
+
+
+def feature_coefficients(extra: Nuisances, own: Sequence[np.ndarray], joints: np.ndarray) -> np.ndarray:
+    """Coefficients of the discrepancy's features themselves, zero but at some joints, shape (n, FEATURES).
+
+    Args:
+        extra: Of any recording.
+        own: Coefficients of each joint's own columns.
+        joints: At which joints, shape (n,).
+    """
+    return np.stack([
+        np.where(use, v[(g == 0) | (g == 1)] * u[(g == 0) | (g == 1)], 0.0)
+        for use, v, g, u in zip(joints, own, extra.groups, extra.units, strict=True)
+    ])  # fmt: skip
 
 
 def nuisances(
@@ -62,26 +79,31 @@ def nuisances(
         for j in range(n):
             rotor = ROTOR * float(robot.armature[j]) * motion.qdd[:, j]
             fixed = np.stack([GAIN_JOINT * load[:, j], DELAY_JOINT * rate[:, j], rotor, bend[:, j]], axis=1)
-            slope = np.zeros((len(motion.t), count))
-            slope[:, r] = motion.direction[:, j]
+            # Levels of dry friction about their mean, which is a law's; of one recording there is nothing beside it.
+            own = (np.arange(count) == r) - 1.0 / count
+            slope = motion.direction[:, [j]] * (own if count > 1 else np.zeros(0))
             features = [f(motion, load, scales, j) for f in (smooth_features, reversal_features)]
             joints.append([band.apply(b) for b in (fixed, *features, slope)])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
+    units = []
     for j in range(n):
+        factors = [np.ones(raw[0][j][0].shape[1])]
         for block in range(1, 4):
             power = sum(np.sum(raw[r][j][block] ** 2, axis=0) for r in range(count))
             rows = sum(len(raw[r][j][block]) for r in range(count))
             rms = np.sqrt(power / rows)
             gone = rms < 1e-9 * np.max(rms, initial=1e-300)
-            width = raw[0][j][block].shape[1]
+            width = max(raw[0][j][block].shape[1], 1)
             # Slopes are shares of a friction level; a discrepancy of size one is as large as the torque.
             size = scales.torque[j] / (1.0 if block == 3 else np.sqrt(width))
             factor = np.where(gone, 0.0, size / np.where(gone, 1.0, 1.0 if block == 3 else rms))
+            factors.append(factor)
             for r in range(count):
                 raw[r][j][block] = raw[r][j][block] * factor
+        units.append(np.concatenate(factors))
         group = np.repeat([-1, 0, 1, 2], [raw[0][j][b].shape[1] for b in range(4)])
         for r in range(count):
             out[r][0].append(np.concatenate(raw[r][j], axis=1))
             out[r][1].append(group)
-    return [Nuisances(c, tuple(own), tuple(g)) for c, (own, g) in zip(commons, out, strict=True)]
+    return [Nuisances(c, tuple(own), tuple(g), tuple(units)) for c, (own, g) in zip(commons, out, strict=True)]

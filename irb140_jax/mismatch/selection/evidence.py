@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, special
 
 from irb140_jax.mismatch.beside import Beside
 from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.evidence import posterior, root, with_prior
 from irb140_jax.mismatch.regression.gram import LEVELS, SIZES, JointGram, Setting
 
 Settings = tuple[Setting, ...]  # one a joint
@@ -27,6 +28,7 @@ class Space:
         size: Shared columns, without y.
         log_prior: Log prior odds of each candidate, shape (candidates,).
         lowest, highest: Admissible amplitudes in prior units, padded with -inf and inf, shape (candidates, width).
+        weights, least: Weights of the amplitudes in a sum that is bounded from below, and its bound, per candidate.
     """
 
     joints: tuple[JointGram, ...]
@@ -37,6 +39,8 @@ class Space:
     log_prior: np.ndarray
     lowest: np.ndarray
     highest: np.ndarray
+    weights: np.ndarray
+    least: np.ndarray
 
     @cached_property
     def beside(self) -> Beside:
@@ -51,20 +55,21 @@ class Space:
     def conflicts(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Candidates that can't stand beside a set, shape (candidates,).
 
-        Beside what `Beside` says: one law a joint holds its level of dry friction, and one puts its log out of time.
+        Beside what `Beside` says: one law a joint holds its level of dry friction, one shifts its log in time, and one
+        candidate frees the inertials of a link.
         """
         out = self.beside.conflicts(chosen)
-        for alike in (self._dry, self._late):
-            taken = np.any(self._acts[:, list(chosen)] & alike[list(chosen)], axis=1)
-            out = out | (alike & np.any(self._acts & taken.reshape(-1, 1), axis=0))
+        for alike in (self._dry, self._late, self._loose):
+            taken = np.any(self.at_joint[:, list(chosen)] & alike[list(chosen)], axis=1)
+            out = out | (alike & np.any(self.at_joint & taken.reshape(-1, 1), axis=0))
         return out
 
     @cached_property
-    def _acts(self) -> np.ndarray:
-        """Which joints each candidate's columns move, shape (n, candidates)."""
+    def at_joint(self) -> np.ndarray:
+        """Which candidates are at which joint, shape (n, candidates)."""
         out = np.zeros((len(self.joints), len(self.candidates)), dtype=bool)
-        for j, which in enumerate(self.touching):
-            out[j, which] = True
+        for i, c in enumerate(self.candidates):
+            out[list(c.joints), i] = True
         return out
 
     @cached_property
@@ -76,13 +81,11 @@ class Space:
         return np.array([c.effect.logged > 1 for c in self.candidates])
 
     @cached_property
-    def touching(self) -> tuple[np.ndarray, ...]:
-        """Candidates whose columns move each joint."""
-        moves = [np.isin(np.arange(self.size), g.index) for g in self.joints]
-        return tuple(np.flatnonzero([m[c].any() for c in self.columns]) for m in moves)
+    def _loose(self) -> np.ndarray:
+        return np.array([c.slug == "inertials" for c in self.candidates])
 
     @cached_property
-    def _place(self) -> tuple[np.ndarray, ...]:
+    def places(self) -> tuple[np.ndarray, ...]:
         """Where each shared column and y stand in a joint's matrix, -1 where they don't, per joint."""
         out = []
         for g in self.joints:
@@ -91,100 +94,220 @@ class Space:
             out.append(place)
         return tuple(out)
 
-    def summed(
-        self, settings: Settings, rows: np.ndarray, columns: np.ndarray, only: Sequence[int] | None = None
-    ) -> np.ndarray:
-        """Gram matrix of some shared columns with others, summed over joints; number `size` is y."""
+    def without(self, blocks: np.ndarray) -> "Space":
+        """The same without some blocks of the data, shape (B,); kept, for each finding asks for it."""
+        key = blocks.tobytes()
+        if key not in self._reduced:
+            self._reduced[key] = dataclasses.replace(self, joints=tuple(g.without(blocks) for g in self.joints))
+        return self._reduced[key]
+
+    @cached_property
+    def _reduced(self) -> dict[bytes, "Space"]:
+        return {}
+
+    def gram(
+        self, settings: Settings, rows: np.ndarray, columns: np.ndarray, only: Sequence[int] | None = None,
+        *, instrument: bool = True,
+    ) -> np.ndarray:  # fmt: skip
+        """Gram matrix of some shared columns with others, summed over joints; number `size` is y.
+
+        Args:
+            settings: Sizes and levels.
+            rows, columns: Which.
+            only: Joints to sum over, all by default.
+            instrument: See `JointGram.at`.
+        """
         H = np.zeros((len(rows), len(columns)))
         for j in range(len(self.joints)) if only is None else only:
-            across, down = self._place[j][rows], self._place[j][columns]
+            across, down = self.places[j][rows], self.places[j][columns]
             r, c = np.flatnonzero(across >= 0), np.flatnonzero(down >= 0)
-            H[np.ix_(r, c)] += self.joints[j].left(settings[j], across[r], down[c])
+            if len(r) and len(c):
+                H[np.ix_(r, c)] += self.joints[j].at(settings[j], instrument).left(across[r], down[c])
         return H
 
-    def _with_y(self, columns: np.ndarray) -> np.ndarray:
+    def with_y(self, columns: np.ndarray) -> np.ndarray:
+        """Columns and y."""
         return np.append(columns, self.size)
 
     def set_columns(self, chosen: Sequence[int]) -> np.ndarray:
         """Shared columns of a set: inertials and common nuisances, then the members' amplitudes."""
         return np.concatenate([np.arange(self.offset), *(self.columns[c] for c in chosen)])
 
+    def constant(self, settings: Settings) -> float:
+        """What sizes and levels add to the log evidence of any set."""
+        return sum(g.at(s).constant for g, s in zip(self.joints, settings, strict=True))
+
     def log_evidence(self, chosen: Sequence[int], settings: Settings) -> float:
         """Log evidence and prior of a set; -inf where its amplitudes are inadmissible."""
-        every = self._with_y(self.set_columns(chosen))
-        H = self.summed(settings, every, every)
-        constant = sum(g.factor(s).constant for g, s in zip(self.joints, settings, strict=True))
-        return constant + float(sum(self.log_prior[c] for c in chosen)) + _solved(H, self._bounds(chosen))[0]
+        every = self.with_y(self.set_columns(chosen))
+        H = self.gram(settings, every, every)
+        if self._impossible(chosen, H):
+            return -np.inf
+        return self.constant(settings) + self._prior(chosen) + float(_log_evidences(H[None])[0])
 
-    def posterior(self, chosen: Sequence[int], settings: Settings) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and covariance of inertials, common nuisances and amplitudes, in prior units."""
-        every = self._with_y(self.set_columns(chosen))
-        H = self.summed(settings, every, every)
-        cov = np.linalg.inv(H[:-1, :-1] + np.eye(len(H) - 1))
-        return cov @ H[:-1, -1], cov
+    def _prior(self, chosen: Sequence[int]) -> float:
+        return float(sum(self.log_prior[c] for c in chosen))
+
+    def posterior(
+        self, chosen: Sequence[int], settings: Settings, *, instrument: bool = True, scaled: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and covariance of inertials, common nuisances and amplitudes, in prior units.
+
+        A strong effect's prior is as wide as it is large: see `evidence.posterior`.
+
+        Args:
+            chosen: The set.
+            settings: Sizes and levels.
+            instrument: Whether the instrument may err within its stated widths; otherwise its part is zero ...
+            scaled: ... but for one scale of all torques, the first of the common nuisances.
+        """
+        every = self.with_y(self.set_columns(chosen))
+        free = np.ones(len(every) - 1, dtype=bool)
+        free[self.inertials : self.offset] = instrument
+        free[self.inertials] |= scaled
+        H = self.gram(settings, every, every, instrument=instrument)
+        at = np.flatnonzero(free)
+        mean, cov = np.zeros(len(free)), np.zeros((len(free), len(free)))
+        ends = np.cumsum([len(self.columns[c]) for c in chosen], dtype=int) + np.count_nonzero(free[: self.offset])
+        named = [slice(int(e) - len(self.columns[c]), int(e)) for c, e in zip(chosen, ends, strict=True)
+                 if self.candidates[c].slug != "inertials"]  # fmt: skip
+        found = posterior(np.pad(H[np.ix_(at, at)], (0, 1)) + np.pad(H[at, -1:], ((0, 1), (len(at), 0))),
+                          np.arange(len(at)), named)  # fmt: skip
+        mean[at], cov[np.ix_(at, at)] = found.mean, found.cov
+        return mean, cov
+
+    def own(
+        self, joint: int, setting: Setting, columns: np.ndarray, mean: np.ndarray, *, instrument: bool
+    ) -> np.ndarray:
+        """Mean of a joint's own nuisances beside a set, shape (D,).
+
+        Args:
+            joint: Which.
+            setting: Its sizes and level.
+            columns: Shared columns of the set.
+            mean: Their mean.
+            instrument: See `JointGram.at`.
+        """
+        own, at = self.joints[joint].at(setting, instrument).own(), self.places[joint][columns]
+        return own[:, -1] - own[:, at[at >= 0]] @ mean[at >= 0]
 
     def settled(
         self, chosen: Sequence[int], settings: Settings, joints: Sequence[int] | None = None
     ) -> tuple[float, Settings]:
-        """Sizes and levels that are best for a set, by coordinate ascent on their grids, at some joints or all.
+        """Sizes and levels that are best for a set, by ascent on their grids, at some joints or all.
 
         Returns:
-            Log evidence and prior of the set, and the settings.
+            Log posterior of the set, summed over shapes, -inf where it is inadmissible; and the settings.
         """
         joints = range(len(self.joints)) if joints is None else joints
-        index = self._with_y(self.set_columns(chosen))
-        prior, best, moved = float(sum(self.log_prior[c] for c in chosen)), -np.inf, True
-        bounds = self._bounds(chosen)
+        index = self.with_y(self.set_columns(chosen))
+        moved = True
         while moved:
             moved = False
             for j in joints:
-                rest = self.summed(settings, index, index, [i for i in range(len(self.joints)) if i != j])
-                constant = prior + sum(
-                    g.factor(s).constant for i, (g, s) in enumerate(zip(self.joints, settings, strict=True)) if i != j
-                )
-                at = self._place[j][index]
-                mine = np.flatnonzero(at >= 0)
-                into, take = np.ix_(mine, mine), at[mine]
+                better = self._climbed(index, settings, j)
+                moved |= better != settings and len(joints) > 1
+                settings = better
+        return self.log_evidence(chosen, settings) + self.over_shapes(chosen, settings), settings
 
-                def value(setting: Setting, j=j, rest=rest, constant=constant, into=into, take=take) -> float:
-                    H = rest.copy()
-                    H[into] += self.joints[j].left(setting, take, take)
-                    return constant + self.joints[j].factor(setting).constant + _solved(H, bounds)[0]
+    def over_shapes(self, chosen: Sequence[int], settings: Settings) -> float:
+        """What a set's log posterior gains where the shapes of its members are summed over instead of the best ones.
 
-                now = value(settings[j])
-                best = max(best, now) if np.isfinite(now) else best
-                climbing = True
-                while climbing:
-                    climbing = False
-                    for other in _near(settings[j]):
-                        v = value(other)
-                        if v > now + 1e-3:
-                            now, climbing, moved = v, True, len(joints) > 1
-                            settings = (*settings[:j], other, *settings[j + 1 :])
-                best = now
-        return best, settings
+        One member at a time, the others' shapes as they are.
+        """
+        out = 0.0
+        for c in chosen:
+            if len(alike := self._alike[c]) > 1:
+                rest = tuple(i for i in chosen if i != c)
+                near = frozenset(i for i in rest if self.at_joint[list(self.candidates[c].joints), i].any())
+                key = c, near, tuple(settings[j] for j in self.candidates[c].joints)
+                if key not in self._summed:
+                    gains = self.gains(rest, settings, np.array(alike))
+                    own = gains[alike.index(c)]
+                    self._summed[key] = float(special.logsumexp(gains) - own) if np.isfinite(own) else 0.0
+                out += self._summed[key]
+        return out
 
-    def _bounds(self, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-        """Admissible amplitudes of inertials and nuisances (any) and of a set."""
-        free = np.full(self.offset, np.inf)
-        low = [self.lowest[c, : len(self.columns[c])] for c in chosen]
-        high = [self.highest[c, : len(self.columns[c])] for c in chosen]
-        return np.concatenate([-free, *low]), np.concatenate([free, *high])
+    @cached_property
+    def _summed(self) -> dict[tuple, float]:
+        return {}
+
+    @cached_property
+    def _alike(self) -> list[list[int]]:
+        """Candidates that differ from each one in shape alone, itself included."""
+        groups: dict[tuple, list[int]] = {}
+        keys = [(c.slug, c.joints, c.variant) for c in self.candidates]
+        for i, key in enumerate(keys):
+            groups.setdefault(key, []).append(i)
+        return [groups[key] for key in keys]
+
+    def _climbed(self, index: np.ndarray, settings: Settings, j: int) -> Settings:
+        """The settings with those of one joint at their best beside a set."""
+        gram = self.joints[j]
+        rest = self.gram(settings, index, index, [i for i in range(len(self.joints)) if i != j])
+        at = self.places[j][index]
+        mine = np.flatnonzero(at >= 0)
+        into, take = np.ix_(mine, mine), at[mine]
+        known: dict[Setting, float] = {}
+
+        def values(tries: list[Setting]) -> None:
+            new = [s for s in tries if s not in known]
+            H = np.repeat(rest[None], len(new), axis=0)
+            for k, s in enumerate(new):
+                H[k][into] += gram.at(s).left(take, take)
+            for s, value in zip(new, _log_evidences(H) if new else (), strict=True):
+                known[s] = gram.at(s).constant + float(value)
+
+        now = settings[j]
+        while True:
+            near = _near(now, gram.lowest)
+            values([now, *near])
+            best = max(near, key=lambda s: known[s])
+            if known[best] <= known[now] + LEAST:
+                return (*settings[:j], now, *settings[j + 1 :])
+            now = best
+
+    def inadmissible(self, chosen: Sequence[int], settings: Settings) -> list[int]:
+        """Members of a set whose amplitudes are not such as can be."""
+        every = self.with_y(self.set_columns(chosen))
+        return self._impossible(chosen, self.gram(settings, every, every))
+
+    def _impossible(self, chosen: Sequence[int], H: np.ndarray) -> list[int]:
+        """The same, from the Gram matrix of a set's columns and y."""
+        if not len(chosen):
+            return []
+        mean = linalg.cho_solve((root(with_prior(H[:-1, :-1])), True), H[:-1, -1])[self.offset :]
+        ends = np.cumsum([len(self.columns[c]) for c in chosen])
+        parts = [mean[e - len(self.columns[c]) : e] for c, e in zip(chosen, ends, strict=True)]
+        return [c for c, part in zip(chosen, parts, strict=True) if self._outside(np.array([c]), part[None])[0]]
+
+    def _outside(self, which: np.ndarray, mean: np.ndarray) -> np.ndarray:
+        """Which candidates' amplitudes (candidates, k) are inadmissible."""
+        k = mean.shape[1]
+        bad = np.any((mean < self.lowest[which, :k] - 1e-9) | (mean > self.highest[which, :k] + 1e-9), axis=1)
+        return bad | (np.sum(mean * self.weights[which, :k], axis=1) < self.least[which])
+
+    def near(self, chosen: Sequence[int], settings: Settings, columns: np.ndarray) -> np.ndarray:
+        """Gram matrix of some shared columns and y, inertials, nuisances and a set integrated out."""
+        base, extra = self.set_columns(chosen), self.with_y(columns)
+        chol = root(with_prior(self.gram(settings, base, base)))
+        half = linalg.solve_triangular(chol, self.gram(settings, base, extra), lower=True, check_finite=False)
+        return self.gram(settings, extra, extra) - half.T @ half
 
     def gains(self, chosen: Sequence[int], settings: Settings, which: np.ndarray) -> np.ndarray:
         """Log posterior odds of adding each of some candidates to a set at these settings; -inf if inadmissible."""
         out = np.full(len(which), -np.inf)
         if not len(which):
             return out
-        base = self.set_columns(chosen)
         extra = np.unique(np.concatenate([self.columns[i] for i in which]))
         number = np.full(self.size, -1)
         number[extra] = np.arange(len(extra))
-        prior = np.eye(len(base))
-        chol = linalg.cholesky(self.summed(settings, base, base) + prior, lower=True, check_finite=False)
-        beside = self.summed(settings, base, self._with_y(extra))
-        half = linalg.solve_triangular(chol, beside, lower=True, check_finite=False)
-        with_y = self.summed(settings, extra, np.array([self.size]))[:, 0] - half[:, :-1].T @ half[:, -1]
+        base = self.set_columns(chosen)
+        chol = root(with_prior(self.gram(settings, base, base)))
+        half = linalg.solve_triangular(
+            chol, self.gram(settings, base, self.with_y(extra)), lower=True, check_finite=False
+        )
+        with_y = self.gram(settings, extra, np.array([self.size]))[:, 0] - half[:, :-1].T @ half[:, -1]
         by_size: dict[int, list[int]] = {}
         for m, i in enumerate(which):
             by_size.setdefault(len(self.columns[i]), []).append(m)
@@ -192,37 +315,44 @@ class Space:
             columns = np.array([self.columns[which[m]] for m in members])
             at = number[columns]
             part = half[:, at]
-            M = np.eye(k) - np.einsum("amk,aml->mkl", part, part, optimize=True)
-            for g, setting, place in zip(self.joints, settings, self._place, strict=True):
+            each = np.moveaxis(part, 0, 1)
+            M = np.eye(k) - np.swapaxes(each, 1, 2) @ each
+            for g, setting, place in zip(self.joints, settings, self.places, strict=True):
                 mine = place[columns]
                 moved = np.flatnonzero((mine >= 0).any(axis=1))
                 if len(moved):
-                    M[moved] += g.own(setting, mine[moved])
+                    M[moved] += g.at(setting).blocks(mine[moved])
             rhs = with_y[at]
             mean = np.linalg.solve(M, rhs[..., None])[..., 0]
             gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
             ids = which[members]
-            bad = np.any((mean < self.lowest[ids, :k] - 1e-9) | (mean > self.highest[ids, :k] + 1e-9), axis=1)
-            out[members] = np.where(bad, -np.inf, gain + self.log_prior[ids])
+            out[members] = np.where(self._outside(ids, mean), -np.inf, gain + self.log_prior[ids])
         return out
 
 
-def _near(setting: Setting) -> list[Setting]:
-    """Neighbours of a setting on the grid."""
-    most = [*([len(SIZES)] * (len(setting) - 1)), len(LEVELS)]
+LEAST = 1e-3  # nats that a step of a size or a level must gain
+
+
+def _near(setting: Setting, lowest: int) -> list[Setting]:
+    """Neighbours of a setting on the grid, with no level below the lowest."""
+    bounds = [*([(0, len(SIZES))] * (len(setting) - 1)), (lowest, len(LEVELS))]
     out = []
-    for axis, top in enumerate(most):
+    for axis, (bottom, top) in enumerate(bounds):
         for step in (-1, 1):
-            if 0 <= setting[axis] + step < top:
+            if bottom <= setting[axis] + step < top:
                 out.append((*setting[:axis], setting[axis] + step, *setting[axis + 1 :]))
     return out
 
 
-def _solved(H: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]) -> tuple[float, np.ndarray]:
-    """Log evidence of amplitudes with unit priors from a Gram matrix whose last column is y, and their mean."""
-    chol = linalg.cholesky(H[:-1, :-1] + np.eye(len(H) - 1), lower=True, check_finite=False)
-    half = linalg.solve_triangular(chol, H[:-1, -1], lower=True, check_finite=False)
-    mean = linalg.solve_triangular(chol, half, lower=True, trans=1, check_finite=False)
-    if np.any(mean < bounds[0] - 1e-9) or np.any(mean > bounds[1] + 1e-9):
-        return -np.inf, mean
-    return 0.5 * float(half @ half) - float(np.log(np.diag(chol)).sum()), mean
+def _log_evidences(H: np.ndarray) -> np.ndarray:
+    """Log evidence of amplitudes with unit priors from Gram matrices (b, k + 1, k + 1) whose last column is y, (b,).
+
+    The last pivot of a Cholesky factor that has y in it is what is left of y.
+    """
+    M = with_prior(H)
+    try:
+        diagonal = np.diagonal(np.linalg.cholesky(M), axis1=1, axis2=2)
+    except np.linalg.LinAlgError:
+        diagonal = np.array([np.diag(root(m)) for m in M])
+    explained = M[:, -1, -1] - diagonal[:, -1] ** 2
+    return 0.5 * explained - np.log(diagonal[:, :-1]).sum(axis=1)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.regression.gram import SIZES
 from irb140_jax.mismatch.selection.evidence import Settings, Space
 
 BEST = 3  # candidates of different kinds that a screening passes on to be judged in full
@@ -22,7 +23,17 @@ class Search:
 
     def __init__(self, space: Space, settings: Settings):
         self.space, self.start = space, settings
+        alone = len(space.joints) == 1
+        whole = [len(c.joints) == len(space.joints) and not alone for c in space.candidates]
+        self._sites = [[i for i, c in enumerate(space.candidates) if j in c.joints and not whole[i]]
+                       for j in range(len(space.joints))]  # fmt: skip
+        self._sites.append([i for i, w in enumerate(whole) if w])
+        # What sizes of the discrepancy fitted anew may gain: the range of its features' prior volume.
+        features = max(int(np.sum(g.groups >= 0)) for g in space.joints)
+        self._refitting = features * np.log(SIZES[-1] / SIZES[1])
         self.visited: dict[frozenset[int], tuple[float, Settings]] = {}
+        self._screened: dict[tuple[int, frozenset[int]], list[tuple[float, int]]] = {}
+        self._in_vain: set[tuple[tuple[int, ...], frozenset[int]]] = set()
 
     def judged(self, chosen: Iterable[int], settings: Settings, joints: Iterable[int] | None = None) -> float:
         """Log posterior of a set, its settings fitted from some near ones."""
@@ -33,20 +44,25 @@ class Search:
         return self.visited[key][0]
 
     def run(self, chosen: Iterable[int] = ()) -> tuple[int, ...]:
-        """The best set that no move improves."""
-        now = frozenset(chosen)
+        """The best set that no move improves, from a set or from ordinary friction at all joints."""
+        now = frozenset(chosen or (i for i, c in enumerate(self.space.candidates) if c.effect.ordinary))
         self.judged(now, self.start)
         moves: tuple[Callable[[frozenset[int]], frozenset[int]], ...] = (
             self._added, self._removed, self._exchanged, self._on_all_joints, self._ordinary,
         )  # fmt: skip
-        moving = True
-        while moving:
-            moving = False
-            for move in moves:
-                while (better := move(now)) != now:
-                    now, moving = better, True
-                    self.visited[now] = self.space.settled(tuple(sorted(now)), self.visited[now][1])
-        return tuple(sorted(now))
+        while True:
+            before, moving = now, True
+            while moving:
+                moving = False
+                for move in moves:
+                    while (better := move(now)) != now:
+                        now, moving = better, True
+                        self.visited[now] = self.space.settled(tuple(sorted(now)), self.visited[now][1])
+            # What was tried in vain beside other sets at other joints counts in the averages beside this one.
+            self._in_vain.clear()
+            self._screened.clear()
+            if now == before:
+                return tuple(sorted(now))
 
     def _value(self, chosen: frozenset[int]) -> float:
         return self.visited[chosen][0]
@@ -55,30 +71,61 @@ class Search:
         """The best of some sets if it improves on a set, else that set."""
         settings, best = self.visited[now][1], now
         for other, joints in others:
-            if self.judged(other, settings, joints) > self._value(best) + (LEAST if best == now else 0.0):
+            other = self._possible(other, settings, joints)
+            if self._value(other) > self._value(best) + (LEAST if best == now else 0.0):
                 best = other
         return best
 
-    def screened(self, chosen: frozenset[int], joint: int, most: int = BEST) -> list[int]:
-        """The most promising candidates at a joint beside a set, the best of each kind and site."""
-        return [i for _, i in self._scored(chosen, joint)[:most]]
+    def _possible(
+        self, chosen: frozenset[int], settings: Settings, joints: Iterable[int] | None
+    ) -> frozenset[int]:
+        """A set, judged, or what is left of it without members whose amplitudes can't be: those would be zero."""
+        while not np.isfinite(self.judged(chosen, settings, joints)):
+            without = chosen - set(self.space.inadmissible(tuple(sorted(chosen)), self.visited[chosen][1]))
+            if without == chosen:
+                break
+            chosen = without
+        return chosen
+
+    def screened(self, chosen: frozenset[int], joint: int, most: int = BEST, least: float = -np.inf) -> list[int]:
+        """The most promising candidates at a joint beside a set, the best of each kind and site.
+
+        Args:
+            chosen: The set.
+            joint: Its number; the one after the last joint's stands for effects of the whole arm.
+            most: How many.
+            least: Log posterior that they must be able to reach with sizes fitted anew.
+        """
+        bad, within = self.space.conflicts(tuple(chosen)), least - self._refitting
+        return [i for v, i in self._scored(chosen, joint) if v > within and not bad[i] and i not in chosen][:most]
 
     def _scored(self, chosen: frozenset[int], joint: int) -> list[tuple[float, int]]:
         """Log posterior of a set with each kind of candidate at a joint, best first, and the candidate.
 
         By the set's own settings or by those with less discrepancy and noise, whichever makes more of them.
         """
+        near = frozenset(m for m in chosen if joint in self.space.candidates[m].joints)
+        if (joint, near) not in self._screened or joint == len(self.space.joints):
+            self._screened[joint, near] = self._scored_anew(chosen, joint)
+        return self._screened[joint, near]
+
+    def _scored_anew(self, chosen: frozenset[int], joint: int) -> list[tuple[float, int]]:
         space, settings = self.space, self.visited[chosen][1]
         bad = space.conflicts(tuple(chosen))
-        which = np.array([i for i in space.touching[joint] if not bad[i] and i not in chosen], dtype=int)
+        which = np.array([i for i in self._sites[joint] if not bad[i] and i not in chosen], dtype=int)
         if not len(which):
             return []
-        own = settings[joint]
-        lower = tuple(max(k - 2, 0) for k in own)
-        lowest = (*(min(k, 1) for k in own[:-1]), max(own[-1] - 6, 0))
         best = np.full(len(which), -np.inf)
-        for other in dict.fromkeys((own, lower, lowest)):
-            trial = (*settings[:joint], other, *settings[joint + 1 :])
+        joints = [joint] if joint < len(space.joints) else range(len(space.joints))
+        lower = tuple(
+            ((*(max(k - 2, 0) for k in own[:-1]), max(own[-1] - 2, space.joints[j].lowest)) if j in joints else own)
+            for j, own in enumerate(settings)
+        )
+        lowest = tuple(
+            ((*(min(k, 1) for k in own[:-1]), max(own[-1] - 6, space.joints[j].lowest)) if j in joints else own)
+            for j, own in enumerate(settings)
+        )
+        for trial in dict.fromkeys((settings, lower, lowest)):
             base = space.log_evidence(tuple(chosen), trial)
             if np.isfinite(base):
                 best = np.maximum(best, base + space.gains(tuple(chosen), trial, which))
@@ -93,7 +140,7 @@ class Search:
         return {j for m in members for j in self.space.candidates[m].joints}
 
     def _added(self, now: frozenset[int]) -> frozenset[int]:
-        tries = {i for j in range(len(self.space.joints)) for i in self.screened(now, j, 2)}
+        tries = {i for j in range(len(self._sites)) for i in self.screened(now, j, 2, self._value(now))}
         return self._best(now, ((now | {i}, self._joints(i)) for i in tries))
 
     def _removed(self, now: frozenset[int]) -> frozenset[int]:
@@ -101,34 +148,62 @@ class Search:
 
     def _exchanged(self, now: frozenset[int]) -> frozenset[int]:
         """One or two members at a joint for one or two others there."""
+        space = self.space
         for drop in [*((c,) for c in now), *self._pairs(now)]:
             rest, joints = now - set(drop), self._joints(*drop)
+            beside = drop, frozenset(m for m in now if self._joints(m) & joints)
+            if beside in self._in_vain:
+                continue
             self.judged(rest, self.visited[now][1], joints)
             others: list[tuple[frozenset[int], set[int]]] = []
-            for j in sorted(joints):
-                for i in self.screened(rest, j):
+            bad = space.conflicts(tuple(rest))
+            special = [i for i in self._special(drop) if not bad[i]]
+            others += [(rest | {i}, joints) for i in special]
+            others += [(rest | set(p), joints) for p in itertools.combinations(special, 2) if self._together(*p)]
+            # What acts on the whole arm takes the place of its like here; of a law on each joint in `_on_all_joints`.
+            whole = [len(space.joints)] if len(joints) == len(space.joints) else []
+            for j in (*sorted(joints), *whole):
+                for i in self.screened(rest, j, least=self._value(now)):
                     one = rest | {i}
                     others.append((one, joints | self._joints(i)))
-                    if len(drop) == 1:
-                        self.judged(one, self.visited[rest][1], joints | self._joints(i))
-                        others += [(one | {k}, joints | self._joints(i, k)) for k in self.screened(one, j, 1)]
+                    self.judged(one, self.visited[rest][1], joints | self._joints(i))
+                    more = self.screened(one, j, 1, self._value(now))
+                    others += [(one | {k}, joints | self._joints(i, k)) for k in more]
             if (better := self._best(now, others)) != now:
                 return better
+            self._in_vain.add(beside)
         return now
+
+    def _special(self, members: tuple[int, ...]) -> list[int]:
+        """Special cases of laws, and ordinary friction in the place of any friction."""
+        out = []
+        for law in map(self._of, members):
+            out += [i for i, c in enumerate(self.space.candidates) if c.joints == law.joints and i not in members
+                    and (c.slug in law.effect.contains or (c.effect.ordinary and law.effect.friction))]  # fmt: skip
+        return sorted(set(out))
+
+    def _together(self, one: int, other: int) -> bool:
+        """Whether two candidates can stand side by side."""
+        return not self.space.conflicts((one,))[other]
 
     def _pairs(self, now: frozenset[int]) -> list[tuple[int, int]]:
         return [p for p in itertools.combinations(sorted(now), 2) if self._joints(p[0]) & self._joints(p[1])]
 
     def _on_all_joints(self, now: frozenset[int]) -> frozenset[int]:
-        """Another kind on every joint at once, or one effect of all joints, in the place of all of a kind."""
-        space, tries = self.space, []
+        """A kind on every joint at once; another, or one effect of all joints, in the place of all of a kind."""
+        space = self.space
+        tries: list[tuple[frozenset[int], None]] = []
         kinds = [self._of(m).slug for m in now if len(self._of(m).joints) == 1 and not self._of(m).effect.ordinary]
+        for slug in dict.fromkeys(kinds):
+            scored = [self._scored_anew(now, j) for j in range(len(space.joints))]
+            each = [next((i for _, i in at if self._of(i).slug == slug), None) for at in scored]
+            tries.append((now | {i for i in each if i is not None}, None))
         for slug in dict.fromkeys(k for k in kinds if kinds.count(k) > 1):
             rest = frozenset(m for m in now if self._of(m).slug != slug)
             without = self.judged(rest, self.visited[now][1])
             gained: dict[str, dict[int, tuple[float, int]]] = {}
-            for j in range(len(space.joints)):
-                for value, i in self._scored(rest, j):
+            for j in range(len(self._sites)):
+                for value, i in self._scored_anew(rest, j):
                     place = j if len(self._of(i).joints) == 1 else -1
                     best = gained.setdefault(self._of(i).slug, {})
                     best[place] = max(best.get(place, (0.0, i)), (value - without, i))
@@ -142,7 +217,7 @@ class Search:
         tries = []
         for j in range(len(self.space.joints)):
             rubs = {m for m in now if self._of(m).effect.friction and self._of(m).joints == (j,)}
-            usual = {i for i in self.space.touching[j] if self._of(i).effect.ordinary and self._of(i).joints == (j,)}
+            usual = {i for i in self._sites[j] if self._of(i).effect.ordinary and self._of(i).joints == (j,)}
             tries += [(now - rubs | usual, [j]), *((now - rubs | {i}, [j]) for i in usual)]
         return self._best(now, tries)
 

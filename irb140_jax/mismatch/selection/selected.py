@@ -1,128 +1,95 @@
-"""What a search with model discrepancy found: the set, how probable its members are, and their amplitudes."""
+"""Which set of candidates explains the rows, with model discrepancy and errors of the instrument beside it."""
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
 from irb140_jax.mismatch.assemble import Data
-from irb140_jax.mismatch.evidence import Posterior
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals, ridge
-from irb140_jax.mismatch.regression.gram import START, own_scale
-from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON, Nuisances
-from irb140_jax.mismatch.selection.averages import Site, probabilities
+from irb140_jax.mismatch.regression.gram import SIZES, START, own_scale
+from irb140_jax.mismatch.regression.nuisances import Nuisances
+from irb140_jax.mismatch.selection.averages import Sets, in_its_place
 from irb140_jax.mismatch.selection.evidence import Settings, Space
 from irb140_jax.mismatch.selection.search import Search
-from irb140_jax.mismatch.selection.space import space_of
 
 # Posterior probability, with that of what may stand in its place, from which an effect is named: odds of ten, "strong"
 # evidence in Jeffreys, Theory of Probability, 1961, app. B.
 NAMED = 0.9
+FREE = (*([len(SIZES) - 1] * (len(START) - 1)), START[-1])  # a discrepancy of any size
 
 
-@dataclasses.dataclass(frozen=True)
-class Selected:
-    """A set of candidates with the sizes of the discrepancy and the noise levels fitted to it.
-
-    Attributes:
-        chosen: The candidates named.
-        space: Gram matrices and priors.
-        settings: Sizes and levels of each joint.
-        sets: Log posterior of every set that the search visited.
-        probability: Of each effect at each site, over those sets.
-        noise: Noise that the whitening used.
-    """
-
-    chosen: tuple[int, ...]
-    space: Space
-    settings: Settings
-    sets: dict[frozenset[int], float]
-    probability: dict[Site, float]
-    noise: Noise
-
-    def posterior(self) -> Posterior:
-        """Inertials and amplitudes, in prior units, with discrepancy and nuisance parameters integrated out."""
-        mean, cov = self.space.posterior(self.chosen, self.settings)
-        common = self.space.offset - self.space.inertials
-        columns = self.space.set_columns(self.chosen)
-        keep = np.flatnonzero((columns < self.space.inertials) | (columns >= self.space.offset))
-        columns = np.where(columns < self.space.inertials, columns, columns - common)[keep]
-        return Posterior(columns, mean[keep], cov[np.ix_(keep, keep)])
-
-    def torque_scale(self) -> tuple[float, float]:
-        """Logged over real torque of all joints alike, less one: mean and standard deviation."""
-        mean, cov = self.space.posterior(self.chosen, self.settings)
-        at = self.space.inertials
-        return GAIN_COMMON * float(mean[at]), GAIN_COMMON * float(np.sqrt(cov[at, at]))
-
-    def rivals(self, index: int) -> dict[Site, float]:
-        """Share of the sets in which another effect stands in a finding's place, by that effect."""
-        return _rivals(self.space, self.sets, self.chosen, index)[0]
-
-
-def _rivals(
-    space: Space, sets: dict[frozenset[int], float], best: Sequence[int], index: int
-) -> tuple[dict[Site, float], float]:
-    """Share of the sets with each effect in the place of a member of the best one, and of those with it or any such.
-
-    In its place stands what is not in the best set and shares a joint with the member, which itself is not there.
-    """
-    site = lambda i: (space.candidates[i].slug, space.candidates[i].joints)  # noqa: E731
-    mine, usual, top = site(index), {site(i) for i in best}, max(sets.values())
-    total, filled, out = 0.0, 0.0, {}
-    for chosen, value in sets.items():
-        weight, there = float(np.exp(max(value - top, -50.0))), {site(i) for i in chosen}
-        others = {s for s in there - usual if set(s[1]) & set(mine[1])} if mine not in there else set()
-        total += weight
-        filled += weight if mine in there or others else 0.0
-        for s in others:
-            out[s] = out.get(s, 0.0) + weight
-    return {s: w / total for s, w in out.items()}, filled / total
-
-
-def selected(data: Data, extra: Sequence[Nuisances], chosen: Sequence[int] = ()) -> Selected:
-    """Search for the best set, average over those on the way, and name what is probable.
+def selected(space: Space, chosen: Sequence[int] = ()) -> tuple[tuple[int, ...], Settings, Sets]:
+    """Search for the best set.
 
     Args:
-        data: Low-passed rows and candidates.
-        extra: Nuisance columns, one per recording.
+        space: What may be in a set.
         chosen: Where the search starts.
+
+    Returns:
+        The best set, sizes and levels beside it, and the log posterior of every set visited.
     """
-    noise = flexible_noise(data, extra)
-    space = space_of(data, extra, noise)
     search = Search(space, (START,) * len(space.joints))
     best = search.run(chosen)
-    probability = probabilities(search)
-    sets = {s: v for s, (v, _) in search.visited.items()}
-    named = tuple(i for i in best if _rivals(space, sets, best, i)[1] >= NAMED)
-    settings = search.visited[frozenset(best)][1]
-    if len(named) < len(best):
-        settings = space.settled(named, settings)[1]
-    return Selected(named, space, settings, sets, probability, noise)
+    return best, search.visited[frozenset(best)][1], {s: v for s, (v, _) in search.visited.items()}
+
+
+def named(space: Space, best: tuple[int, ...], settings: Settings, sets: Sets) -> tuple[tuple[int, ...], Settings]:
+    """Members of the best set that are probable together with what may stand in their place; sizes and levels then."""
+    sure = tuple(i for i in best if in_its_place(space.candidates, sets, best, i)[1] >= NAMED)
+    return sure, settings if sure == best else space.settled(sure, settings)[1]
 
 
 def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:
-    """Noise that is left where every column of the library and of the discrepancy may help.
+    """Noise that inertials, ordinary friction and a discrepancy of any size leave: where the fit of levels starts.
 
     Args:
         data: Low-passed rows and candidates.
         extra: Nuisance columns, one per recording.
     """
     n = data.stretches[0].y.shape[1]
-    use = [s.use for s in data.stretches]
+    usual = [data.nuisances + c.columns for c in data.candidates if c.effect.ordinary]
+    shared = np.concatenate([np.arange(data.nuisances), *usual])
     residuals, dof = [np.zeros_like(s.y) for s in data.stretches], np.zeros(n)
     for j in range(n):
-        keep = np.any([np.any(s.X[:, j] != 0.0, axis=0) for s in data.stretches], axis=0) & (data.scale > 0)
-        size = np.concatenate([data.scale[keep], own_scale(extra[0].groups[j], START)])
+        keep = shared[np.any([np.any(s.X[:, j, shared] != 0.0, axis=0) for s in data.stretches], axis=0)]
+        size = np.concatenate([data.scale[keep], own_scale(extra[0].groups[j], FREE)])
         columns = [
             np.concatenate([s.X[:, j][:, keep], e.own[j]], axis=1) * size
             for s, e in zip(data.stretches, extra, strict=True)
         ]
-        A = np.concatenate([x[u[:, j]] for x, u in zip(columns, use, strict=True)])
-        y = np.concatenate([s.y[u[:, j], j] for s, u in zip(data.stretches, use, strict=True)])
+        A = np.concatenate([x[s.use[:, j]] for x, s in zip(columns, data.stretches, strict=True)])
+        y = np.concatenate([s.y[s.use[:, j], j] for s in data.stretches])
         if len(y) < 10:
             continue
         v, dof[j] = ridge(A, y)
         for s, r, x in zip(data.stretches, residuals, columns, strict=True):
             r[:, j] = s.y[:, j] - x @ v
-    return noise_from_residuals(residuals, use, dof, [s.unsure for s in data.stretches])
+    return noise_from_residuals(residuals, [s.use for s in data.stretches], dof, [s.unsure for s in data.stretches])
+
+
+def noise_left(
+    data: Data, extra: Sequence[Nuisances], space: Space, chosen: Sequence[int], settings: Settings
+) -> Noise:
+    """Noise that a set leaves, with errors of the instrument and the discrepancy beside it.
+
+    Args:
+        data: Low-passed rows and candidates.
+        extra: Nuisance columns, one per recording.
+        space: Gram matrices.
+        chosen: The set.
+        settings: Sizes and levels beside it.
+    """
+    mean, cov = space.posterior(chosen, settings)
+    columns, n = space.set_columns(chosen), len(space.joints)
+    amplitudes = columns[space.offset :] - space.offset + data.nuisances
+    at = np.r_[0 : data.nuisances, amplitudes]
+    w = np.r_[mean[: data.nuisances], mean[space.offset :]] * data.scale[at]
+    common = mean[data.nuisances : space.offset]
+    own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(settings)]
+    residuals = []
+    for s, e in zip(data.stretches, extra, strict=True):
+        r = s.y - s.X[..., at] @ w - e.common @ common
+        residuals.append(r - np.stack([x @ v for x, v in zip(e.own, own, strict=True)], axis=1))
+    shared = (len(mean) - float(np.trace(cov))) / n  # shrunk ones count for less; they are split over the joints
+    dof = np.array([g.at(s).dof() for g, s in zip(space.joints, settings, strict=True)]) + shared
+    return noise_from_residuals(residuals, [s.use for s in data.stretches], dof, [s.unsure for s in data.stretches])

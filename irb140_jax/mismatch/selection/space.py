@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.mismatch.assemble import Data
+from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.regression.gram import joint_grams
 from irb140_jax.mismatch.regression.nuisances import Nuisances
@@ -12,47 +13,89 @@ from irb140_jax.mismatch.selection.evidence import Space
 
 RARE = 0.05  # expected number of sites of a robot at which an effect that few machines have is left out
 COMMON = 0.5  # probability of ordinary friction at a joint
+EVENT = 0.2  # s before what happens once, or after it, that must be recorded
 
 
-def space_of(data: Data, extra: Sequence[Nuisances], noise: Noise) -> Space:
+def space_of(
+    data: Data, extra: Sequence[Nuisances], noise: Noise, lib: Library, first: Library, sensors: np.ndarray,
+    blocks: int = 1, *, settled: bool = True,
+) -> Space:  # fmt: skip
     """Gram matrices of the rows, with the prior probability of every candidate.
 
     Args:
         data: Low-passed rows and candidates.
         extra: Nuisance columns of each recording.
-        noise: Sensors' noise.
+        noise: Of the rows.
+        lib: The library.
+        first: The library before its shapes were refined: what was to be expected of them.
+        sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
+        blocks: Contiguous blocks per recording.
+        settled: Whether the grids of shapes have been refined.
     """
-    common = extra[0].common.shape[-1]
-    kinds: dict[tuple[str, tuple[int, ...]], int] = {}
-    places: dict[str, set[tuple[int, ...]]] = {}
-    for c in data.candidates:
-        kinds[c.slug, c.joints] = kinds.get((c.slug, c.joints), 0) + 1
-        places.setdefault(c.slug, set()).add(c.joints)
-    rare = np.array([
-        np.log(RARE / len(places[c.slug]) / (kinds[c.slug, c.joints] * c.effect.scanned)) for c in data.candidates
-    ])  # fmt: skip
-    # The last link's inertials and a payload's are one thing under two priors, whose widths mean little: a factor of
-    # three in each of ten parameters.
-    held = any(c.effect.tied and data.scale[data.nuisances + c.columns[0]] > 0.0 for c in data.candidates)
-    last = data.stretches[0].y.shape[1] - 1
-    doubly = [held and c.slug == "inertials" and c.joints == (last,) for c in data.candidates]
-    rare -= 10.0 * np.log(3.0) * np.array(doubly)
-    usual = np.log(COMMON / (1.0 - COMMON))
-    log_prior = np.where([c.effect.ordinary for c in data.candidates], usual, rare)
-    width = max(len(c.columns) for c in data.candidates)
-    lowest = np.full((len(data.candidates), width), -np.inf)
-    highest = np.full((len(data.candidates), width), np.inf)
-    for i, c in enumerate(data.candidates):
-        s = data.scale[data.nuisances + c.columns]
-        k, moves = len(c.columns), s > 0.0
-        lowest[i, :k] = np.where(moves, c.lowest / np.where(moves, s, 1.0), np.where(c.lowest == 0.0, np.inf, -np.inf))
-        highest[i, :k] = c.highest / np.where(moves, s, 1.0)
-        if moves.all():
-            least, most = c.effect.at_shape(c.shape)
-            own = list(c.variant)
-            lowest[i, :k] = np.maximum(lowest[i, :k], least[own] / s)
-            highest[i, :k] = np.minimum(highest[i, :k], most[own] / s)
+    common, candidates = extra[0].common.shape[-1], data.candidates
+    width = max(len(c.columns) for c in candidates)
+    lowest, highest = np.full((2, len(candidates), width), -np.inf)
+    highest[:] = np.inf
+    weights, least = np.zeros((len(candidates), width)), np.full(len(candidates), -np.inf)
+    for i, c in enumerate(candidates):
+        s, k = data.scale[data.nuisances + c.columns], len(c.columns)
+        unit = np.where(s > 0.0, s, 1.0)
+        # What is there only if it is more than nothing, but moves nothing here, can't be found.
+        unseen = (s == 0.0) & (c.lowest == 0.0) | (c.effect.once and _throughout(data, c))
+        low, high = c.lowest, c.highest
+        if settled:
+            low = np.where(np.isin(c.variant, c.effect.own), np.maximum(low, c.effect.settled), low)
+        if len(c.shape) and (s > 0.0).all():
+            at_least, at_most = c.effect.at_shape(c.shape)
+            low = np.maximum(low, at_least[list(c.variant)])
+            high = np.minimum(high, at_most[list(c.variant)])
+        lowest[i, :k], highest[i, :k] = np.where(unseen, np.inf, low / unit), high / unit
+        if c.effect.adds_up:
+            weights[i, :k], least[i] = s, c.lowest[0]
     return Space(
-        joint_grams(data, extra, noise), data.candidates, data.nuisances, data.nuisances + common,
-        len(data.scale) + common, log_prior, lowest, highest,
+        joint_grams(data, extra, noise, blocks, sensors), candidates, data.nuisances, data.nuisances + common,
+        len(data.scale) + common, log_prior(data, lib, first), lowest, highest, weights, least,
     )  # fmt: skip
+
+
+def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
+    """Log prior odds of every candidate, shape (candidates,): of its effect, its site and its shape."""
+    sites: dict[str, set[tuple[int, ...]]] = {}
+    kinds: dict[tuple[str, tuple[int, ...]], int] = {}
+    for c in data.candidates:
+        sites.setdefault(c.slug, set()).add(c.joints)
+        kinds[c.slug, c.joints] = kinds.get((c.slug, c.joints), 0) + 1
+    narrowed = {
+        (new[0].slug, tuple(map(int, joints))): _narrowed(new[2][s], old[2][s])
+        for new, old in zip(lib.blocks, first.blocks, strict=True)
+        for s, joints in enumerate(new[1])
+    }
+
+    def rare(c: Candidate) -> float:
+        shape = kinds[c.slug, c.joints] * c.effect.scanned
+        return float(np.log(RARE / len(sites[c.slug]) / shape)) + narrowed.get((c.slug, c.joints), 0.0)
+
+    usual = np.log(COMMON / (1.0 - COMMON))
+    return np.array([usual if c.effect.ordinary else rare(c) for c in data.candidates])
+
+
+def _narrowed(grid: np.ndarray, first: np.ndarray) -> float:
+    """Log of the share of the first grid's extent that a refined one covers: its prior volume.
+
+    Extents are ratios where a parameter is positive, and differences otherwise.
+    """
+    out = 0.0
+    for new, old in zip(grid.T, first.T, strict=True):
+        if np.all(first > 0.0) and np.all(new > 0.0):
+            new, old = np.log(new), np.log(old)
+        if np.ptp(old) > 0.0 and np.ptp(new) > 0.0:
+            out += min(float(np.log(np.ptp(new) / np.ptp(old))), 0.0)
+    return out
+
+
+def _throughout(data: Data, c: Candidate) -> bool:
+    """Whether what should happen once neither begins nor ends while it is recorded."""
+    recording, begins, ends = c.effect.during(c.shape)
+    seen = [s.t[np.any(s.use, axis=1)] - s.begin for s in data.stretches if s.recording == recording]
+    t = np.concatenate([*seen, np.zeros(0)])
+    return len(t) == 0 or (begins < t[0] + EVENT and ends > t[-1] - EVENT)

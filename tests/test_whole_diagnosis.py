@@ -1,19 +1,14 @@
-"""The whole way of a diagnosis with model discrepancy, on plants that share nothing with it."""
+"""The whole way of a diagnosis, on plants that share nothing with it."""
 
 import json
-import pathlib
-import sys
 
 from testbed import runner, scoring
 from testbed.cases import make
 
-sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "experiments"))
-import second_engine  # noqa: E402
-
 
 def said(index: int) -> dict:
     """A case of the draw that may be looked at, as it is stored."""
-    line = json.loads(json.dumps(runner.compact(runner.judged(make("work", index), second_engine.diagnose))))
+    line = json.loads(json.dumps(runner.compact(runner.judged(make("work", index)))))
     assert line["diagnosis"], line
     return line
 
