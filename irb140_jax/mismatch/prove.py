@@ -25,7 +25,7 @@ class HeldOut:
         named: Of refit and findings together.
         corrected: The same, with the discrepancy where it is carried.
         use: Rows that count, (R, n).
-        carried: Joints at which the discrepancy makes every unseen motion's error smaller, shape (n,).
+        carried: Joints at which the discrepancy makes the error on unseen data smaller, shape (n,).
     """
 
     nominal: list[np.ndarray]
@@ -135,12 +135,11 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     bare = [s.of_rigid_body(refit.columns) for s in data.stretches]
     out = {"refit": [s.y.copy() for s in bare], "named": [s.y.copy() for s in data.stretches]}
     out["flexible"] = [s.y.copy() for s in data.stretches]
-    better = np.ones(len(ex.settings), dtype=bool)
+    gain = np.zeros(len(ex.settings))
     for fold in folds(ex):
         post, scale, own = ex.prediction(fold)
         corrected = np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean) * data.scale[post.columns]
         inertial = refit.posterior(fold).mean * data.scale[refit.columns]
-        gain = np.zeros(len(better))
         for r, s in enumerate(data.stretches):
             mine = fold[recording == s.recording]
             edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
@@ -153,8 +152,7 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
                 out["flexible"][r][rows] = out["named"][r][rows] - delta
                 old, new = (np.where(s.use[rows], out[k][r][rows], 0.0) for k in ("named", "flexible"))
                 gain += np.sum(old**2 - new**2, axis=0)
-        better &= gain > 0.0
-    nominal, use = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches]
+    nominal, use, better = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches], gain > 0.0
     carried = [np.where(better, f, c) for f, c in zip(out["flexible"], out["named"], strict=True)]
     return HeldOut(nominal, out["refit"], out["named"], carried, use, better)
 

@@ -22,7 +22,7 @@ ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which a sign is rou
 LATE = (-0.01, -0.005, 0.005, 0.01, 0.02)  # s by which friction turns before or after the joint
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
-FEATURES = 82  # of both blocks
+FEATURES = 78  # of both blocks
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,7 +92,7 @@ def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) ->
 
 
 def reversal_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
-    """What happens around one joint's reversals and along its slopes, shape (T, 45); arguments as above."""
+    """What happens around one joint's reversals and along its slopes, shape (T, 41); arguments as above."""
     q, qd, qdd, dt = r.q[:, j], r.qd[:, j], r.qdd[:, j], float(np.mean(np.diff(r.t)))
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
@@ -104,9 +104,7 @@ def reversal_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) 
     carried = np.abs(load[:, j]) / max(float(scales.torque[j]), 1e-12)
     pushed = np.abs(qdd) / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
     slopes = np.stack([np.gradient(load[:, j], dt), np.gradient(qdd, dt)], axis=1)
-    # What differs by direction may go on through a reversal, or vanish there.
-    even = np.stack([np.abs(np.tanh(qd / (share * scales.speed[j]))) - 1.0 for share in ROUNDED], axis=1)
-    return np.concatenate([X, X * carried[:, None], X * pushed[:, None], slopes, even], axis=1)
+    return np.concatenate([X, X * carried[:, None], X * pushed[:, None], slopes], axis=1)
 
 
 def _relaxed(q: np.ndarray, travel: float) -> np.ndarray:

@@ -15,7 +15,8 @@ GAIN_COMMON, GAIN_JOINT = 0.10, 0.03  # torque scale of all joints, and of each 
 DELAY_COMMON, DELAY_JOINT = 1e-3, 5e-4  # s between torque and position channels
 SMOOTHED = 2e-5  # s^2 of the torque's second derivative: what smoothing takes off accelerations that noise hides
 ROTOR = 0.10  # of the stated armature
-FIXED = ("gain", "delay", "rotor", "smoothing")  # a joint's own columns with stated widths, in their order
+BIAS = 0.10  # of the joint's torque: what differs by direction may go on through a reversal, or vanish there
+FIXED = ("gain", "delay", "rotor", "smoothing", "bias")  # a joint's own columns with stated widths, in their order
 SCALED = ("smooth", "reversal", "slope")  # blocks of a joint whose size is learned from the recordings
 
 
@@ -78,7 +79,8 @@ def nuisances(
         joints = []
         for j in range(n):
             rotor = ROTOR * float(robot.armature[j]) * motion.qdd[:, j]
-            fixed = np.stack([GAIN_JOINT * load[:, j], DELAY_JOINT * rate[:, j], rotor, bend[:, j]], axis=1)
+            bias = BIAS * scales.torque[j] * (1.0 - np.abs(motion.direction[:, j]))
+            fixed = np.stack([GAIN_JOINT * load[:, j], DELAY_JOINT * rate[:, j], rotor, bend[:, j], bias], axis=1)
             # Levels of dry friction about their mean, which is a law's; of one recording there is nothing beside it.
             own = (np.arange(count) == r) - 1.0 / count
             slope = motion.direction[:, [j]] * (own if count > 1 else np.zeros(0))
