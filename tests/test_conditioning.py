@@ -154,7 +154,8 @@ def test_encoder_noise_above_the_motion_does_not_fill_the_acceleration():
 def through(sign, step=0.005):
     """The direction of these signs, 0 for unknown."""
     speeds = np.asarray(sign, dtype=float)[:, None]
-    return direction_of(np.where(speeds == 0.0, 1e-9, speeds), np.array([1e-3]), 1.0 / step)[:, 0]
+    speeds = np.where(speeds == 0.0, 1e-9, speeds)
+    return direction_of(speeds, np.zeros_like(speeds), np.array([1e-4]), np.array([1e-3]), 1.0 / step)[:, 0]
 
 
 def test_over_a_reversal_that_sticks_the_direction_runs_evenly_from_sign_to_sign():
@@ -163,9 +164,19 @@ def test_over_a_reversal_that_sticks_the_direction_runs_evenly_from_sign_to_sign
     assert d[99:110] == pytest.approx(np.linspace(-1.0, 1.0, 11))
 
 
-def test_over_a_quick_reversal_the_direction_follows_the_speed():
+def test_over_a_quick_reversal_the_direction_turns_when_the_speed_does():
+    # At a constant deceleration, through zero a fifth of the way between two samples.
+    rate, speed = 200.0, 0.05 * (np.arange(-20, 20) + 0.2)[:, None]
+    d = direction_of(speed, np.full_like(speed, 0.05 * rate), np.array([1e-6]), np.array([1e-3]), rate)[:, 0]
+    assert d[:20] == pytest.approx(-1.0, abs=1e-4) and d[21:] == pytest.approx(1.0, abs=1e-4)
+    # The sample stands for half a step to either side: it moved backwards for .3 of its time, forwards for .7.
+    assert d[20] == pytest.approx(0.7 - 0.3, abs=1e-3)
+
+
+def test_noise_rounds_the_direction_off_no_further_than_it_hides_the_sign():
     speed = np.concatenate([-np.ones(100), [-9e-4, -3e-4, 3e-4, 9e-4], np.ones(100)])[:, None]
-    assert direction_of(speed, np.array([1e-3]), 200.0) == pytest.approx(np.tanh(speed / 1e-3), abs=1e-12)
+    d = direction_of(speed, np.zeros_like(speed), np.array([3e-4]), np.array([1e-3]), 200.0)
+    assert d == pytest.approx(np.tanh(speed / 3e-4), abs=1e-6)
 
 
 def test_a_joint_that_starts_has_run_up_to_its_friction_and_one_that_ends_at_rest_is_held():

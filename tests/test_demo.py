@@ -35,7 +35,7 @@ def irb140(tmp_path_factory):
 def demo(irb140, tmp_path_factory) -> tuple[pathlib.Path, str]:
     """Folder and words of a demonstration."""
     out = tmp_path_factory.mktemp("demo") / "out"
-    return out, irb140("demo", "--seed", 0, "--out", out)
+    return out, irb140("demo", "--seed", 6, "--out", out)
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +140,7 @@ def test_predict_gives_the_torque_that_was_logged_where_the_model_is_corrected(i
         model: float(np.std((predicted[f"tau_{model}.{joint}"] - logged[f"tau.{joint}"])[rest]))
         for model in ("nominal", "refit", "corrected")
     }
-    # The noise of the torque sensor, 1 % of the joint's torque, is in both; the hidden effect is 14 %.
+    # The noise of the torque sensor, 1 % of the joint's torque, is in both; the hidden effect is some 17 %.
     assert error["corrected"] < 0.5 * error["refit"]
     assert np.isfinite(predicted.to_numpy()).all()
 
@@ -149,7 +149,7 @@ def test_the_readme_shows_this_demonstration(demo):
     # Words only: the last digits may differ between processors.  After a change: python experiments/fill_readme.py
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     diagnosis = json.loads((demo[0] / "diagnosis.json").read_text())
-    shown = readme.split("$ irb140 demo --seed 0 --out demo\n", 1)[1].split("```", 1)[0]
+    shown = readme.split("$ irb140 demo --seed 6 --out demo\n", 1)[1].split("```", 1)[0]
     for finding in diagnosis["findings"]:
         assert finding["effect"].replace("_", " ") in shown and ", ".join(finding["joints"]) in shown
     assert "The truth, now revealed" in shown

@@ -79,7 +79,8 @@ def explain(
         extra = nuisances(robot, along, known, band, scales)
         whitening = noise or flexible_noise(data, extra)
         space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1)
-        best, settings, sets = selected(space, chosen)
+        # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
+        best, settings, sets = selected(space, chosen, every_move=turn == 1 or blocks > 1)
         return Explanation(lib, scales, data, extra, whitening, space, best, settings, sets, factor)
 
     turn, coarse, off = 1, False, False

@@ -12,6 +12,7 @@ from irb140_jax.mismatch.explanation import Explanation, parts
 from irb140_jax.mismatch.intervals import parameters_of
 from irb140_jax.mismatch.prove import held_out_gains
 from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
+from irb140_jax.mismatch.selection.selected import NAMED
 from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.robot import Robot
@@ -94,21 +95,29 @@ def _log_odds(ex: Explanation, index: int) -> float:
 
 
 def _alternatives(ex: Explanation, index: int) -> list[dict[str, Any]]:
+    """What may stand in a finding's place, and what to record; a part of its law that stays is no alternative."""
     c = ex.data.candidates[index]
     best: dict[str, float] = {}
     for (slug, _), p in ex.rivals(index).items():
         if slug not in SILENT and slug != c.slug and p > WORTH_SAYING:
             best[slug] = max(best.get(slug, 0.0), p)
+    parts = {slug: p for slug, p in best.items() if slug in c.effect.contains}
+    others = {slug: p for slug, p in best.items() if slug not in parts}
+    alone = {slug: p for slug, p in parts.items() if NAMED * p > sum(others.values())}
     return [
-        {"effect": slug, "probability": p, "separate_by": _separation(c.effect, CATALOGUE[slug])}
-        for slug, p in sorted(best.items(), key=lambda item: -item[1])
-    ]
+        {
+            "effect": slug, "probability": p,
+            "separate_by": _separation(c.effect, CATALOGUE[slug], [s for s in parts if s not in alone and s != slug]),
+        }
+        for slug, p in sorted((others | alone).items(), key=lambda item: -item[1])
+    ]  # fmt: skip
 
 
-def _separation(one: AbstractEffect, other: AbstractEffect) -> str:
+def _separation(one: AbstractEffect, other: AbstractEffect, stays: list[str]) -> str:
     motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
     motion = motion or f"{one.needs}; and, for {other.title}, {other.needs}"
-    return f"Record {motion}."
+    beside = " and ".join(CATALOGUE[s].title for s in stays)
+    return f"Record {motion}" + (f" ({beside} is there in either case)." if stays else ".")
 
 
 def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any]]:

@@ -187,8 +187,10 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     grid = np.arange(t[keep][0], t[keep][-1] + 1e-9, 1.0 / band.rate)
     q, qd, qdd, tau, unsure = (_at(grid, t, x) for x in (*smoothed, tau, unsure))
     tau = tau if has_torque else np.full_like(tau, np.nan)
-    rest_speed = np.maximum(np.maximum(3.0 * speed_noise, 0.003 * np.abs(qd).max(axis=0, initial=0.0)), 1e-6)
-    direction = direction_of(qd, rest_speed, band.rate)
+    hidden = np.maximum(3.0 * speed_noise, 1e-6)
+    rest_speed = np.maximum(hidden, 0.003 * np.abs(qd).max(axis=0, initial=0.0))
+    direction = filtered(direction_of(smoothed[1], smoothed[2], hidden, rest_speed, raw_rate), anti_alias)
+    direction = _at(grid, t, direction)
     stuck = _at(grid, recording.t, _within_a_step(recording).astype(float))
     resting = _widened(np.maximum(_held(np.abs(qd) < rest_speed, band.rate), stuck), band.rate)
     # A gap spoils what the smoother and, later, the low-pass reach from it; half their length holds most of that.

@@ -1,7 +1,8 @@
 """Which way a joint moves, as dry friction sees it: the sign of a speed that noise hides near rest.
 
-A tanh of the speed rounds the sign off where noise hides it.  Where a joint sticks that is not all that is known: its
-torque runs from one level of friction to the other, while the encoder shows no speed at all.
+Over a quick reversal it is the sign, rounded off no further than noise hides it: friction that turns over later than it
+does is a law of its own, and must not be made of the smoothing.  Where a joint rests, a tanh of the speed stands for it.
+Where it sticks its torque runs from one level of friction to the other, while the encoder shows no speed at all.
 """
 
 import numpy as np
@@ -10,32 +11,45 @@ REST = 0.1  # s that a joint must stay where it is to rest: a reversal takes les
 STICK = 0.04  # s of a reversal without speed by which it sticks: one that does not is faster through
 
 
-def direction_of(qd: np.ndarray, rest_speed: np.ndarray, rate: float) -> np.ndarray:
+def direction_of(
+    qd: np.ndarray, qdd: np.ndarray, noise: np.ndarray, rest_speed: np.ndarray, rate: float
+) -> np.ndarray:
     """sign(qd) along an even grid, and what friction does where a joint is too slow to tell.
 
+    A sample stands for the time half-way to its neighbours, so a reversal counts from when it happens between samples.
     Over a reversal in which the joint sticks it runs evenly from one sign to the other.  A joint that starts has run up
     to its sign for `REST`, for the motor must overcome friction before anything moves; one whose recording ends as it
     comes to rest is held until the end.  After longer rests torque has been seen to fall off, and by how much is not
     known: there a tanh of the speed stands for it.
 
     Args:
-        qd: Speeds, shape (T, n).
-        rest_speed: Speed that noise can't tell from rest, shape (n,).
+        qd, qdd: Speeds and accelerations, shape (T, n).
+        noise: Speed beneath which noise hides the sign, shape (n,).
+        rest_speed: Speed beneath which a joint may be at rest, shape (n,).
         rate: Samples per second.
 
     Returns:
         The direction, from -1 to 1, shape (T, n).
     """
-    out = np.tanh(qd / rest_speed)
-    for sign, direction in zip(np.where(np.abs(qd) >= rest_speed, np.sign(qd), 0.0).T, out.T, strict=True):
+    out, sharp = np.tanh(qd / rest_speed), _mean_tanh(qd / noise, np.abs(qdd) / (2.0 * rate * noise))
+    signs = np.where(np.abs(qd) >= rest_speed, np.sign(qd), 0.0)
+    for sign, through, direction in zip(signs.T, sharp.T, out.T, strict=True):
         if sign.any():
-            _fill_rests(sign, direction, int(REST * rate), int(STICK * rate))
+            _fill(sign, through, direction, int(REST * rate), int(STICK * rate))
     return out
 
 
-def _fill_rests(sign: np.ndarray, direction: np.ndarray, rest: int, stick: int) -> None:
-    """Set the direction of one joint, in place, where its sign is not known (0) but what surrounds it is."""
+def _mean_tanh(x: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Mean of tanh from x - reach to x + reach."""
+    log_cosh = lambda y: np.abs(y) + np.log1p(np.exp(-2.0 * np.abs(y)))  # noqa: E731
+    wide = np.maximum(reach, 1e-3)  # narrower, it is the tanh itself to seven digits
+    return (log_cosh(x + wide) - log_cosh(x - wide)) / (2.0 * wide)
+
+
+def _fill(sign: np.ndarray, sharp: np.ndarray, direction: np.ndarray, rest: int, stick: int) -> None:
+    """Set the direction of one joint, in place, where its sign is known and where what surrounds it is."""
     known = np.flatnonzero(sign)
+    direction[known] = sharp[known]
     first, last = known[0], known[-1]
     run_up = min(first, rest)
     direction[first - run_up : first] = sign[first] * np.arange(run_up) / max(run_up, 1)
@@ -43,5 +57,7 @@ def _fill_rests(sign: np.ndarray, direction: np.ndarray, rest: int, stick: int) 
         direction[last:] = sign[last]
     for i in np.flatnonzero(np.diff(known) > 1):
         before, after = known[i], known[i + 1]
-        if sign[before] != sign[after] and stick <= after - before < rest:
+        if after - before < stick:
+            direction[before:after] = sharp[before:after]
+        elif sign[before] != sign[after] and after - before < rest:
             direction[before:after] = np.linspace(sign[before], sign[after], after - before, endpoint=False)

@@ -43,13 +43,18 @@ class Search:
             self.visited[key] = self.space.settled(tuple(sorted(key)), settings, at)
         return self.visited[key][0]
 
-    def run(self, chosen: Iterable[int] = ()) -> tuple[int, ...]:
-        """The best set that no move improves, from a set or from ordinary friction at all joints."""
+    def run(self, chosen: Iterable[int] = (), *, every_move: bool = True) -> tuple[int, ...]:
+        """The best set that no move improves, from a set or from ordinary friction at all joints.
+
+        Args:
+            chosen: Where it starts.
+            every_move: Whether to try more than to add and to remove.
+        """
         now = frozenset(chosen or (i for i, c in enumerate(self.space.candidates) if c.effect.ordinary))
         self.judged(now, self.start)
         moves: tuple[Callable[[frozenset[int]], frozenset[int]], ...] = (
             self._added, self._removed, self._exchanged, self._on_all_joints, self._ordinary,
-        )  # fmt: skip
+        )[: None if every_move else 2]  # fmt: skip
         while True:
             before, moving = now, True
             while moving:
@@ -169,6 +174,10 @@ class Search:
                     self.judged(one, self.visited[rest][1], joints | self._joints(i))
                     more = self.screened(one, j, 1, self._value(now))
                     others += [(one | {k}, joints | self._joints(i, k)) for k in more]
+            # Alone it may also be what a single member is.
+            if len(drop) == 1 and not whole:
+                arm = self.screened(rest, len(space.joints), 1, self._value(now))
+                others += [(rest | {i}, joints | self._joints(i)) for i in arm]
             if (better := self._best(now, others)) != now:
                 return better
             self._in_vain.add(beside)

@@ -18,24 +18,44 @@ NAMED = 0.9
 FREE = (*([len(SIZES) - 1] * (len(START) - 1)), START[-1])  # a discrepancy of any size
 
 
-def selected(space: Space, chosen: Sequence[int] = ()) -> tuple[tuple[int, ...], Settings, Sets]:
+def selected(
+    space: Space, chosen: Sequence[int] = (), *, every_move: bool = True
+) -> tuple[tuple[int, ...], Settings, Sets]:
     """Search for the best set.
 
     Args:
         space: What may be in a set.
         chosen: Where the search starts.
+        every_move: See `Search.run`.
 
     Returns:
         The best set, sizes and levels beside it, and the log posterior of every set visited.
     """
     search = Search(space, (START,) * len(space.joints))
-    best = search.run(chosen)
+    best = search.run(chosen, every_move=every_move)
     return best, search.visited[frozenset(best)][1], {s: v for s, (v, _) in search.visited.items()}
 
 
 def named(space: Space, best: tuple[int, ...], settings: Settings, sets: Sets) -> tuple[tuple[int, ...], Settings]:
-    """Members of the best set that are probable together with what may stand in their place; sizes and levels then."""
-    sure = tuple(i for i in best if in_its_place(space.candidates, sets, best, i)[1] >= NAMED)
+    """What is stated: the members of a set that are probable together with what may stand in their place.
+
+    Of sets that can't be told from the best one it is that with the fewest members: two names for what may be one need
+    the odds for it.
+
+    Args:
+        space: What may be in a set.
+        best: The best set.
+        settings: Sizes and levels beside it.
+        sets: Log posterior of every set visited.
+
+    Returns:
+        The members, and sizes and levels beside them.
+    """
+    top, least = frozenset(best), sets[frozenset(best)] - np.log(NAMED / (1.0 - NAMED))
+    # Whether one of its own members may be missing is for that member's probability to say.
+    even = [s for s, value in sets.items() if value > least and not s < top]
+    few = tuple(sorted(min(even, key=lambda s: (len(s), -sets[s]))))
+    sure = tuple(i for i in few if in_its_place(space.candidates, sets, few, i)[1] >= NAMED)
     return sure, settings if sure == best else space.settled(sure, settings)[1]
 
 
