@@ -49,6 +49,7 @@ class Motion(eqx.Module):
         rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
         direction: sign(qd), and between two signs what friction does while a joint sticks, shape (T, n).
         recording: Number of the recording, from 0; below 0 for motion that the diagnosis did not see, shape ().
+        turned: Positions at which the joints turned round before the first sample, the last one last, shape (K, n).
     """
 
     t: Samples
@@ -64,6 +65,7 @@ class Motion(eqx.Module):
     rest_speed: Joints
     direction: JointSamples
     recording: Scalar
+    turned: Float[Array, "K n"] | None = None
 
 
 def of_site(array: JointSamples, joints: Int[Array, " m"]) -> Float[Array, "T m"]:

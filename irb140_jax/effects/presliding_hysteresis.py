@@ -45,11 +45,13 @@ class PreslidingHysteresis(AbstractEffect):
         return True
 
     def columns(self, motion, joints, shape):
-        q = of_site(motion.q, joints)
+        q, before = of_site(motion.q, joints), 0
+        if motion.turned is not None:
+            q, before = jnp.concatenate([of_site(motion.turned, joints), q]), len(motion.turned)
         dq = jnp.diff(q, axis=0, prepend=q[:1])
         keep = jnp.exp(-jnp.abs(dq) / shape[0])
         _, z = lax.associative_scan(lambda a, b: (a[0] * b[0], a[1] * b[0] + b[1]), (keep, jnp.sign(dq) * (1.0 - keep)))
-        return z[:, :, None]
+        return z[before:, :, None]
 
     def memory(self, q, tau):
         return jnp.concatenate([q, jnp.zeros_like(q)])

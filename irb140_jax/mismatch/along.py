@@ -1,5 +1,6 @@
 """What a robot and every candidate do along a recording: sensitivities and columns."""
 
+import dataclasses
 from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
@@ -17,10 +18,12 @@ from irb140_jax.effects import Motion, RigidBody, Scales
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.mismatch.candidates import Library
 from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.turning_points import turned_before, turning_points
 from irb140_jax.robot import Robot, about_origin
 from irb140_jax.types import JointSamples
 
-RUN_IN = 128  # samples in which effects with memory forget how their chunk began
+RUN_IN = 128  # samples in which effects with memory of time forget how their chunk began
+TURNS = 32  # turning points before a chunk, by which effects with memory of the path know how it began
 CHUNK = 1024 + RUN_IN  # samples per compiled call: recordings of any length reuse one program
 # Three directions of gravity without a zero or a one, which would each be a program of its own.
 PULLS = np.array([[2.0, 3.0, 5.0], [5.0, 2.0, 3.0], [3.0, 5.0, 2.0]])  # m/s^2
@@ -173,6 +176,7 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
     whole = Motion(*moving, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
     per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)
     sites, shapes = [b[1] for b in lib.blocks], [b[2] for b in lib.blocks]
+    turns = [turning_points(q) for q in r.q.T]
     out = np.empty((len(r.t), len(lib.entries[0])))
     for start in range(0, max(len(r.t) - RUN_IN, 1), CHUNK - RUN_IN):
         pad = max(start + CHUNK - len(r.t), 0)
@@ -183,6 +187,7 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
             return np.pad(x[start : start + CHUNK], ((0, pad),) + ((0, 0),) * (x.ndim - 1), mode="edge")
 
         motion, run_in = jax.tree.map(piece, whole, per_sample), RUN_IN if start else 0
+        motion = dataclasses.replace(motion, turned=turned_before(r.q, turns, start, TURNS))
         effects = np.asarray(_columns(tuple(b[0] for b in lib.blocks), motion, sites, shapes))
         out[start + run_in : start + CHUNK] = effects[run_in : CHUNK - pad]
     return Columns(along.Y, along.nominal, along.motor_side, _bounded(lib, out))
