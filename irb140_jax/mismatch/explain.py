@@ -4,9 +4,9 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy import special
 
 from irb140_jax.effects import AbstractEffect
-from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
 from irb140_jax.mismatch.assemble import BLOCKS, assemble
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
@@ -17,6 +17,7 @@ from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.nuisances import nuisances
 from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
+from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.mismatch.tangent import Point, point
@@ -25,8 +26,8 @@ from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
 PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both ...
-MOST_PASSES = 5  # ... unless a shape is known far better than its grid is fine:
-COARSE = 100.0  # nats by which its best point exceeds all others in some direction; a slightly wrong shape costs that
+MOST_PASSES = 8  # ... unless shapes become finer and finer:
+SETTLED = 0.1  # relative change of the noise from round to round
 
 
 def explain(
@@ -58,6 +59,7 @@ def explain(
     at: Point | None = None
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
+    inside: dict[Site, float] = {}
 
     def explained(turn: int, blocks: int) -> Explanation:
         ex = explained_at(at, turn, blocks)
@@ -78,7 +80,7 @@ def explain(
         known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in zip(along, loads, strict=True)]
         extra = nuisances(robot, along, known, band, scales)
         whitening = noise or flexible_noise(data, extra)
-        space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1)
+        space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1, inside=inside)
         # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
         best, settings, sets = selected(space, chosen, every_move=turn == 1 or blocks > 1)
         return Explanation(lib, scales, data, extra, whitening, space, best, settings, sets, factor)
@@ -94,9 +96,12 @@ def explain(
         loads = [t.loads for t in torques]
         off = _off(ex, torques, band)
         noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
-        # A first grid is too coarse for any law to be right: with a discrepancy all its points are equally good.
-        coarse = _coarse(ex)
-        lib, chosen = _refined(ex if turn > 1 else _without_discrepancy(ex))
+        coarse = _coarse(ex, noise)
+        # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
+        refined, chosen = _refined(_without_discrepancy(ex) if turn == 1 or coarse else ex)
+        for site, share in _inside(ex, refined).items():
+            inside[site] = inside.get(site, 0.0) + share
+        lib = refined
         turn += 1
         del ex  # hundreds of megabytes, before the next
     ex = explained(turn, BLOCKS)
@@ -160,18 +165,30 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
     return refined, tuple(_same(ex.data.candidates[i], shape, i, refined) for i, shape in best.items())
 
 
-def _coarse(ex: Explanation) -> bool:
-    """Whether the shape of a member is known so well that in some direction its grid has no other point that can be."""
+def _inside(ex: Explanation, refined: Library) -> dict[Site, float]:
+    """Log of the posterior probability of what the refined grid of each member's shape covers of the one before."""
+    out = {}
     for index in ex.chosen:
         mine = ex.data.candidates[index]
         if mine.effect.refines():
             grid, odds = _grid_of(ex, index)
-            best = odds[np.argmin(np.abs(grid - mine.shape).sum(axis=1))]
-            for points in nearest_in_each_direction(grid, mine.shape):
-                beside = np.sort(odds[points][np.isfinite(odds[points])])[-2:]  # the best may be midway between two
-                if len(beside) and best - beside[0] > COARSE:
-                    return True
-    return False
+            now = np.array([c.shape for c in refined.candidates if site_of(c) == site_of(mine)])
+            covered = np.all((grid >= now.min(axis=0)) & (grid <= now.max(axis=0)), axis=1)
+            if covered.any() and np.isfinite(odds[covered]).any():
+                out[site_of(mine)] = float(special.logsumexp(odds[covered]) - special.logsumexp(odds))
+    return out
+
+
+def _coarse(ex: Explanation, left: Noise) -> bool:
+    """Whether finer shapes may still leave less at some joint: the noise left there is not yet what it was thought.
+
+    Args:
+        ex: The explanation.
+        left: Noise that it leaves.
+    """
+    shaped = [j for m in ex.members if m.effect.refines() for j in m.joints]
+    was, now = (np.sqrt(np.mean(noise.total**2, axis=0)) for noise in (ex.noise, left))
+    return bool(np.any(np.abs(np.log(now / was))[shaped] > SETTLED))
 
 
 def _peak(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
