@@ -1,6 +1,7 @@
 """Recordings of arms, and of physics that MuJoCo has itself, from a loop that is not ours."""
 
 from collections.abc import Callable
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -83,9 +84,20 @@ def recorded(
     return Recording(times[::2], q + 1e-5 * rng.normal(size=q.shape), tau + noise, names, source="native")
 
 
-def named(xml: str, hide: Callable[[mujoco.MjModel], None], seed: int, **during) -> dict[tuple[str, ...], float]:
-    """The first parameter of every finding."""
+def findings(xml: str, hide: Callable[[mujoco.MjModel], None], seed: int, **during) -> list[dict[str, Any]]:
+    """What a diagnosis of two recordings finds."""
     rng = np.random.default_rng(seed)
     robot = robot_from_model(mujoco.MjModel.from_xml_string(xml), source="native")
-    found = diagnose(robot, [recorded(xml, hide, rng, **during) for _ in range(2)]).diagnosis["findings"]
-    return {(f["effect"], *f["joints"]): next(iter(f["parameters"].values()))["value"] for f in found}
+    return diagnose(robot, [recorded(xml, hide, rng, **during) for _ in range(2)]).diagnosis["findings"]
+
+
+def found(xml: str, hide: Callable[[mujoco.MjModel], None], seed: int, **during) -> dict[tuple[str, ...], tuple]:
+    """Value and standard deviation of the first parameter of every finding."""
+    first = lambda f: next(iter(f["parameters"].values()))  # noqa: E731
+    said = findings(xml, hide, seed, **during)
+    return {(f["effect"], *f["joints"]): (first(f)["value"], first(f)["std"]) for f in said}
+
+
+def named(xml: str, hide: Callable[[mujoco.MjModel], None], seed: int, **during) -> dict[tuple[str, ...], float]:
+    """The first parameter of every finding."""
+    return {key: value for key, (value, _) in found(xml, hide, seed, **during).items()}

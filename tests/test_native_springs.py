@@ -20,5 +20,5 @@ def test_a_spring_that_takes_less_than_half_a_hundredth_of_the_torque_is_named()
     d = diagnose(robot, [recorded(PENDULUM, lambda true: None, rng, truly=BENDING) for _ in range(2)]).diagnosis
     assert [f["effect"] for f in d["findings"]] == ["joint_elasticity"]
     spring = d["findings"][0]["parameters"]["stiffness"]
-    assert abs(spring["value"] / STIFFNESS - 1.0) < 0.05
+    assert abs(spring["value"] / STIFFNESS - 1.0) < 0.2
     assert abs(spring["value"] - STIFFNESS) < 2.0 * spring["std"]

@@ -20,7 +20,7 @@ def two_cases():
 
 
 def test_a_section_holds_the_figures_of_its_cases():
-    section = report.section("check", two_cases())
+    section = report.section("check", two_cases(), [])
     assert section["cases"] == 2 and section["diagnosed"] == 1 and section["engine"] == "abc"
     assert "| false names a case, ordinary friction aside | 1 | at most 0.05 |" in section["figures"]
     assert "| torque constants named within 5 % | 1 of 1: 100.0 % (21 to 100) |" in section["figures"]

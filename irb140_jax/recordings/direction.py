@@ -1,8 +1,8 @@
 """Which way a joint moves, as dry friction sees it: the sign of a speed that noise hides near rest.
 
-Over a quick reversal it is the sign, rounded off no further than noise hides it: friction that turns over later than it
-does is a law of its own, and must not be made of the smoothing.  Where a joint rests, a tanh of the speed stands for it.
-Where it sticks its torque runs from one level of friction to the other, while the encoder shows no speed at all.
+Over a quick reversal it is the sign, rounded off no further than noise hides it: friction that is rounded further is a
+law of its own.  Where a joint rests, a tanh of the speed stands for it.  Where it sticks its torque runs from one level
+of friction to the other, while the encoder shows no speed at all.
 """
 
 import numpy as np
