@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy import special
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
@@ -17,7 +16,6 @@ from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.nuisances import nuisances
 from irb140_jax.mismatch.rows import stretch
 from irb140_jax.mismatch.scout import left_over, scouted, suggested
-from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.mismatch.tangent import Point, point
@@ -59,7 +57,6 @@ def explain(
     at: Point | None = None
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
-    inside: dict[Site, float] = {}
 
     def explained(turn: int, blocks: int) -> Explanation:
         ex = explained_at(at, turn, blocks)
@@ -80,7 +77,7 @@ def explain(
         known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in zip(along, loads, strict=True)]
         extra = nuisances(robot, along, known, band, scales)
         whitening = noise or flexible_noise(data, extra)
-        space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1, inside=inside)
+        space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1)
         # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
         best, settings, sets = selected(space, chosen, every_move=turn == 1 or blocks > 1)
         return Explanation(lib, scales, data, extra, whitening, space, best, settings, sets, factor)
@@ -98,10 +95,7 @@ def explain(
         noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
         coarse = _coarse(ex, noise)
         # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
-        refined, chosen = _refined(_without_discrepancy(ex) if turn == 1 or coarse else ex)
-        for site, share in _inside(ex, refined).items():
-            inside[site] = inside.get(site, 0.0) + share
-        lib = refined
+        lib, chosen = _refined(_without_discrepancy(ex) if turn == 1 or coarse else ex)
         turn += 1
         del ex  # hundreds of megabytes, before the next
     ex = explained(turn, BLOCKS)
@@ -163,20 +157,6 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
         shapes.append(new)
     refined = reshaped(ex.lib, shapes)
     return refined, tuple(_same(ex.data.candidates[i], shape, i, refined) for i, shape in best.items())
-
-
-def _inside(ex: Explanation, refined: Library) -> dict[Site, float]:
-    """Log of the posterior probability of what the refined grid of each member's shape covers of the one before."""
-    out = {}
-    for index in ex.chosen:
-        mine = ex.data.candidates[index]
-        if mine.effect.refines():
-            grid, odds = _grid_of(ex, index)
-            now = np.array([c.shape for c in refined.candidates if site_of(c) == site_of(mine)])
-            covered = np.all((grid >= now.min(axis=0)) & (grid <= now.max(axis=0)), axis=1)
-            if covered.any() and np.isfinite(odds[covered]).any():
-                out[site_of(mine)] = float(special.logsumexp(odds[covered]) - special.logsumexp(odds))
-    return out
 
 
 def _coarse(ex: Explanation, left: Noise) -> bool:

@@ -123,7 +123,7 @@ def discrepancy_notes(robot: Robot, proof: HeldOut) -> list[str]:
         return []
     return [
         f"On {', '.join(joints)} the corrected model adds a function of the joint's own motion that no effect names, "
-        "because it makes the error of every unseen motion smaller. `irb140 predict` holds it; corrected.xml and "
+        "because it makes the error on unseen motions smaller. `irb140 predict` holds it; corrected.xml and "
         "load_corrected do not."
     ]
 

@@ -1,6 +1,6 @@
 """From low-passed rows to the space that a search visits: priors and bounds of every candidate, Gram matrices."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -9,7 +9,6 @@ from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.regression.gram import joint_grams
 from irb140_jax.mismatch.regression.nuisances import Nuisances
-from irb140_jax.mismatch.selection.averages import Site
 from irb140_jax.mismatch.selection.evidence import Space
 
 RARE = 0.05  # expected number of sites of a robot at which an effect that few machines have is left out
@@ -19,7 +18,7 @@ EVENT = 0.2  # s before what happens once, or after it, that must be recorded
 
 def space_of(
     data: Data, extra: Sequence[Nuisances], noise: Noise, lib: Library, first: Library, sensors: np.ndarray,
-    blocks: int = 1, *, settled: bool = True, inside: Mapping[Site, float] | None = None,
+    blocks: int = 1, *, settled: bool = True,
 ) -> Space:  # fmt: skip
     """Gram matrices of the rows, with the prior probability of every candidate.
 
@@ -32,7 +31,6 @@ def space_of(
         sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         blocks: Contiguous blocks per recording.
         settled: Whether the grids of shapes have been refined.
-        inside: See `log_prior`.
     """
     common, candidates = extra[0].common.shape[-1], data.candidates
     width = max(len(c.columns) for c in candidates)
@@ -56,29 +54,19 @@ def space_of(
             weights[i, :k], least[i] = s, c.lowest[0]
     return Space(
         joint_grams(data, extra, noise, blocks, sensors), candidates, data.nuisances, data.nuisances + common,
-        len(data.scale) + common, log_prior(data, lib, first, inside or {}), lowest, highest, weights, least,
+        len(data.scale) + common, log_prior(data, lib, first), lowest, highest, weights, least,
     )  # fmt: skip
 
 
-def log_prior(data: Data, lib: Library, first: Library, inside: Mapping[Site, float]) -> np.ndarray:
-    """Log prior odds of every candidate, shape (candidates,): of its effect, its site and its shape.
-
-    A refined grid has the prior probability of what it covers of the first one.  What the recordings had left of the
-    rest when it was refined counts with it.
-
-    Args:
-        data: Low-passed rows and candidates.
-        lib: The library.
-        first: The library before its shapes were refined.
-        inside: Log of the posterior probability that each refined grid had of all shapes.
-    """
+def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
+    """Log prior odds of every candidate, shape (candidates,): of its effect, its site and its shape."""
     sites: dict[str, set[tuple[int, ...]]] = {}
     kinds: dict[tuple[str, tuple[int, ...]], int] = {}
     for c in data.candidates:
         sites.setdefault(c.slug, set()).add(c.joints)
         kinds[c.slug, c.joints] = kinds.get((c.slug, c.joints), 0) + 1
     narrowed = {
-        (site := (new[0].slug, tuple(map(int, joints)))): _narrowed(new[2][s], old[2][s]) - inside.get(site, 0.0)
+        (new[0].slug, tuple(map(int, joints))): _narrowed(new[2][s], old[2][s])
         for new, old in zip(lib.blocks, first.blocks, strict=True)
         for s, joints in enumerate(new[1])
     }
