@@ -28,7 +28,7 @@ def test_friction_under_which_mujoco_lets_a_slide_creep_is_no_stribeck(friction)
         true.dof_frictionloss[2], true.dof_damping[2] = friction, 8.0
 
     said = found(SCARA, hide, 0)
-    hidden = {("coulomb_friction", "lift"): friction, ("viscous_friction", "lift"): 8.0}
+    hidden: dict[tuple[str, ...], float] = {("coulomb_friction", "lift"): friction, ("viscous_friction", "lift"): 8.0}
     assert said.keys() == hidden.keys()
     # How its friction gives way is in no law: that is a discrepancy, and leaves the levels open by as much.
     for key, (value, std) in said.items():

@@ -72,7 +72,9 @@ class Search:
     def _value(self, chosen: frozenset[int]) -> float:
         return self.visited[chosen][0]
 
-    def _best(self, now: frozenset[int], others: Iterable[tuple[frozenset[int], Iterable[int]]]) -> frozenset[int]:
+    def _best(
+        self, now: frozenset[int], others: Iterable[tuple[frozenset[int], Iterable[int] | None]]
+    ) -> frozenset[int]:
         """The best of some sets if it improves on a set, else that set."""
         settings, best = self.visited[now][1], now
         for other, joints in others:
