@@ -7,7 +7,6 @@ import dataclasses
 import json
 import pathlib
 
-import numpy as np
 import tyro
 
 PAGE = pathlib.Path(__file__).resolve().parents[1] / "docs" / "real-machines.md"
@@ -98,15 +97,17 @@ def gears(results: dict) -> list[str]:
         others = ", ".join(f["effect"] for f in r["findings"] if f["effect"] != "backlash")
         rows.append(f"| `{name}` | {play} | {'' if published is None else f'{published:g}'} | {others} |")
     known = [r for r in results.values() if r["published_gap_arc_minutes"] is not None]
-    off = [abs(r["gap_arc_minutes"]["value"] - r["published_gap_arc_minutes"]) if r["gap_arc_minutes"] else np.inf
-           for r in known]  # fmt: skip
+    off = [abs(r["gap_arc_minutes"]["value"] - r["published_gap_arc_minutes"]) for r in known if r["gap_arc_minutes"]]
+    agree = f"The gaps named are within {max(off):.0f} arc-minutes of them (goal 10)." if off else (
+        "So the goal of 10 arc-minutes is missed: presliding friction with a softer spring explains these recordings "
+        "as well, and play is at best listed as an alternative.")  # fmt: skip
     return [
         "## Cycloidal gears, output bolted down (`cycloidal_play`)", "",
         "| run | backlash named [arc-min] | published | other findings |", "|---|---|---|---|", *rows, "",
-        f"The gaps agree with the published ones within {max(off):.0f} arc-minutes (goal 10). The published gaps come",
-        "from a fit of a spring, dry friction and a dead zone. Where the diagnosis also finds presliding friction,",
-        "that fit counts it as backlash. The `12pre` runs are preloaded, so no backlash may be named there. The other",
-        "findings change with small changes of the noise level.",
+        f"Play is named on {len(off)} of the {len(known)} runs with a published gap. {agree}",
+        "The published gaps come from a fit of a spring, dry friction and a dead zone. Where the diagnosis also finds",
+        "presliding friction, that fit counts it as backlash. The `12pre` runs are preloaded, so no backlash may be",
+        "named there. The other findings change with small changes of the noise level.",
     ]  # fmt: skip
 
 
