@@ -21,14 +21,18 @@ def verdict(
 ) -> str:
     """The contract's verdict.
 
-    `unexplained` where nothing is named, or where more is left unnamed than was named.  `undecided` where nothing is
-    named and a joint can't be told of; beside names that is a note.
+    `unexplained` where nothing is named, or where more is left unnamed than was named.  `undecided` where a joint can't
+    be told of, and nothing is named elsewhere, nor takes more off such a joint's error than is left there; beside
+    names that is a note.
     """
-    nominal, corrected = (proof.rmse(x) for x in (proof.nominal, proof.corrected))
+    nominal, refit, corrected = (proof.rmse(x) for x in (proof.nominal, proof.refit, proof.corrected))
     named = np.sqrt(np.clip(nominal**2 - corrected**2, 0.0, None))
+    names = ex.lib.robot.joint_names
+    at = {names.index(joint) for finding in found for joint in finding["joints"]}
+    told = any(j not in open_ or refit[j] ** 2 > 2.0 * corrected[j] ** 2 for j in at)
     if any(not found or u.rms > named[u.joint] for u in rest):
         return "unexplained"
-    if open_ and not found:
+    if open_ and not told:
         return "undecided"
     if found:
         return "physics_left_out"
