@@ -57,7 +57,8 @@ def servo(result: dict) -> list[str]:
     return [
         "## A hobby servo with a pendulum (`bam_xl330`)", "",
         "The figures of this section are stored results of the first statistical engine",
-        "([decisions 30 to 33](decisions/index.md) replaced it); the search of the drive's parameters was not run again.", "",
+        "([decisions 30 to 33](decisions/index.md) replaced it); the search of the drive's parameters was not run",
+        "again.", "",
         "The diagnosis uses twelve runs (gains 100, 200 and 800). The four runs with gain 400 are kept for testing.",
         f"From torque alone it names {named(result['findings'])}. It can't name a payload here: the torque of a single",
         "hinge does not depend on the mass of a payload, only on its moments.", "",
