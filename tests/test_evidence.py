@@ -67,7 +67,7 @@ def log_evidence(X: np.ndarray, y: np.ndarray, scale: np.ndarray) -> float:
 def test_gains_are_differences_of_dense_gaussian_evidence(seed):
     data, noise = stretches(seed), a_noise(seed)
     scale = np.random.default_rng(seed).uniform(0.2, 2.0, NUISANCES + AMPLITUDES)
-    G = grams(data, noise, scale, NUISANCES, blocks=4).total()
+    G = grams(data, noise, scale, blocks=4).sum(axis=0)
     H, _ = eliminated(G, np.arange(NUISANCES))
     X, y = rows_by_hand(data, noise)
     nothing = log_evidence(X[:, :NUISANCES], y, scale[:NUISANCES])
@@ -83,7 +83,7 @@ def test_posterior_is_that_of_dense_bayesian_regression(seed):
     data, noise = stretches(seed), a_noise(seed)
     scale = np.random.default_rng(seed).uniform(0.2, 2.0, NUISANCES + AMPLITUDES)
     columns = np.array([0, 1, 2, 3, 5, 7])
-    post = posterior(grams(data, noise, scale, NUISANCES, blocks=3).total(), columns)
+    post = posterior(grams(data, noise, scale, blocks=3).sum(axis=0), columns)
     X, y = rows_by_hand(data, noise)
     X, W = X[:, columns], np.diag(scale[columns])
     S = np.eye(len(y)) + X @ W @ W @ X.T
@@ -133,22 +133,19 @@ def test_eliminating_costs_the_log_determinant_and_nothing_eliminates_nothing():
     assert eliminated(H, np.zeros(0, dtype=int))[1] == 0.0
 
 
-def test_blocks_and_joints_add_up_and_leaving_blocks_out_is_leaving_their_rows_out():
+def test_blocks_add_up_and_those_of_a_recording_are_its_own():
     data, noise, scale = stretches(2), a_noise(2), np.full(NUISANCES + AMPLITUDES, 0.7)
-    g = grams(data, noise, scale, NUISANCES, blocks=5)
+    blocks = grams(data, noise, scale, blocks=5)
     X, y = rows_by_hand(data, noise)
     rows = np.concatenate([X * scale, y[:, None]], axis=1)
-    np.testing.assert_allclose(g.total(), rows.T @ rows, atol=1e-9)
-    np.testing.assert_allclose(g.per_joint.sum(axis=0), g.total(), atol=1e-9)
-    assert g.rows.sum() == len(y) and list(g.recording) == [0] * 5 + [1] * 5
-    first = rows[: int(g.rows[:5].sum())]
-    np.testing.assert_allclose(g.total(without=g.recording == 1), first.T @ first, atol=1e-9)
+    np.testing.assert_allclose(blocks.sum(axis=0), rows.T @ rows, atol=1e-9)
+    np.testing.assert_allclose(blocks[:5].sum(axis=0), grams(data[:1], noise, scale, blocks=1)[0], atol=1e-9)
 
 
 def test_rows_that_do_not_count_leave_no_trace():
     data, noise, scale = stretches(3), a_noise(3), np.ones(NUISANCES + AMPLITUDES)
     spoiled = [dataclasses.replace(s, y=np.where(s.use, s.y, 1e6)) for s in data]
-    clean, dirty = (grams(x, noise, scale, NUISANCES, blocks=4).total() for x in (data, spoiled))
+    clean, dirty = (grams(x, noise, scale, blocks=4).sum(axis=0) for x in (data, spoiled))
     np.testing.assert_array_equal(clean, dirty)
 
 

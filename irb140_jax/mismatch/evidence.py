@@ -24,64 +24,33 @@ WIDENINGS = 10  # rounds in which the priors of strong effects become as wide as
 ROUNDING = 1e-12  # relative; a log of nonsense can make columns that are equal to a dozen digits
 
 
-@dataclasses.dataclass(frozen=True)
-class Grams:
+def grams(stretches: list[Stretch], noise: Noise, scale: np.ndarray, blocks: int) -> np.ndarray:
     """Whitened Gram matrices [X | y]'[X | y] of blocks of the data, columns scaled by their prior standard deviation.
-
-    Attributes:
-        blocks: Shape (blocks, K + 1, K + 1).
-        recording: Recording of each block, shape (blocks,).
-        rows: Whitened rows of each block and joint, shape (blocks, n).
-        per_joint: The same for each joint's rows over all blocks, shape (n, K + 1, K + 1).
-        nuisances: The first so many columns are the inertial parameters.
-    """
-
-    blocks: np.ndarray
-    per_joint: np.ndarray
-    recording: np.ndarray
-    rows: np.ndarray
-    nuisances: int
-
-    def of(self, columns: np.ndarray) -> "Grams":
-        """The same of some columns and y alone."""
-        index = np.append(columns, self.blocks.shape[-1] - 1)
-        part = lambda H: H[:, index[:, None], index]  # noqa: E731
-        return dataclasses.replace(self, blocks=part(self.blocks), per_joint=part(self.per_joint))
-
-    def total(self, without: np.ndarray | None = None) -> np.ndarray:
-        """Sum over blocks, leaving some out."""
-        return self.blocks.sum(axis=0) if without is None else self.blocks[~without].sum(axis=0)
-
-
-def grams(stretches: list[Stretch], noise: Noise, scale: np.ndarray, nuisances: int, blocks: int) -> Grams:
-    """Whiten and form the Gram matrices.
 
     Args:
         stretches: One per recording.
         noise: Whitening.
         scale: Prior standard deviation of each column's amplitude, shape (K,).
-        nuisances: Number of inertial columns, which come first.
         blocks: Contiguous blocks per recording.
+
+    Returns:
+        Shape (recordings * blocks, K + 1, K + 1).
     """
     n, size = stretches[0].y.shape[1], stretches[0].X.shape[-1] + 1
-    total, per_joint = np.zeros((len(stretches) * blocks, size, size)), np.zeros((n, size, size))
-    rows = np.zeros((len(stretches) * blocks, n))
+    total = np.zeros((len(stretches) * blocks, size, size))
     # Joints side by side: nearly all of the time is in products, and those hold no lock.
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        joints = threads.map(partial(_grams_of_joint, stretches, noise, scale, blocks), range(n))
-        for j, (index, own, count) in enumerate(joints):
+        for index, own in threads.map(partial(_grams_of_joint, stretches, noise, scale, blocks), range(n)):
             total[:, index[:, None], index] += own
-            per_joint[j][np.ix_(index, index)] = own.sum(axis=0)
-            rows[:, j] = count
-    return Grams(total, per_joint, np.repeat([s.recording for s in stretches], blocks), rows, nuisances)
+    return total
 
 
 def _grams_of_joint(
     stretches: list[Stretch], noise: Noise, scale: np.ndarray, blocks: int, j: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Columns that are not zero throughout and y; their Gram matrices by block; and the rows of each block."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Columns that are not zero throughout and y, and their Gram matrices by block."""
     active = np.flatnonzero(np.any([np.any(s.X[:, j] != 0.0, axis=0) for s in stretches], axis=0))
-    out, count = [], []
+    out = []
     for s in stretches:
         A = np.concatenate([s.X[:, j][:, active] * scale[active], s.y[:, j : j + 1]], axis=1)
         A, usable = noise.whitened(A, j, s.recording, s.unsure[:, j]), noise.usable(s.use[:, j], j)
@@ -91,8 +60,7 @@ def _grams_of_joint(
         for block in map(slice, edges[:-1], edges[1:]):
             part = A[block][usable[block]]
             out.append(part.T @ part)
-            count.append(len(part))
-    return np.append(active, stretches[0].X.shape[-1]), np.stack(out), np.array(count)
+    return np.append(active, stretches[0].X.shape[-1]), np.stack(out)
 
 
 def with_prior(G: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from irb140_jax.mismatch.assemble import BLOCKS
-from irb140_jax.mismatch.evidence import Grams, Posterior, grams, posterior
+from irb140_jax.mismatch.evidence import Posterior, grams, posterior
 from irb140_jax.mismatch.explanation import Explanation, parts
 from irb140_jax.mismatch.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
@@ -88,12 +88,13 @@ class Refit:
     Attributes:
         ex: The explanation that it stands beside.
         loose: Its candidates that stand for inertials wrong beyond their stated uncertainty: free here too.
-        grams: Gram matrices of their columns and the inertials' alone, under the noise that those leave.
+        grams: Gram matrices of their columns and the inertials' alone, by block, under the noise that they leave, shape
+            (blocks, K + 1, K + 1).
     """
 
     ex: Explanation
     loose: tuple[int, ...]
-    grams: Grams
+    grams: np.ndarray
 
     @property
     def columns(self) -> np.ndarray:
@@ -102,7 +103,8 @@ class Refit:
 
     def posterior(self, without: np.ndarray | None = None) -> Posterior:
         """Inertials of possible bodies from all blocks, or from all but some."""
-        post = posterior(self.grams.total(without), np.arange(len(self.columns)))
+        blocks = self.grams if without is None else self.grams[~without]
+        post = posterior(blocks.sum(axis=0), np.arange(len(self.columns)))
         mean = self.ex.of_bodies(post.mean, post.cov, self.loose, self.ex.data.nuisances)
         return Posterior(self.columns, mean, post.cov)
 
@@ -113,14 +115,14 @@ def refitted(ex: Explanation) -> Refit:
     columns = ex.columns(loose)
     stretches = [s.of_rigid_body(columns) for s in ex.data.stretches]
     scale = ex.data.scale[columns]
-    return Refit(ex, loose, grams(stretches, _noise_left(stretches, scale, ex.noise), scale, len(columns), BLOCKS))
+    return Refit(ex, loose, grams(stretches, _noise_left(stretches, scale, ex.noise), scale, BLOCKS))
 
 
 def _noise_left(stretches: list[Stretch], scale: np.ndarray, noise: Noise) -> Noise:
     """Noise that columns leave, fitted under noise that was guessed before, and again under what they leave."""
     every, n = np.arange(len(scale)), stretches[0].y.shape[1]
     for _ in range(SETTLED):
-        post = posterior(grams(stretches, noise, scale, len(scale), 1).total(), every)
+        post = posterior(grams(stretches, noise, scale, 1).sum(axis=0), every)
         residuals = [s.y - s.X @ (post.mean * scale) for s in stretches]
         # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
         dof = np.full(n, (len(scale) - float(np.trace(post.cov))) / n)

@@ -57,7 +57,7 @@ class Questions:
             [np.full(len(self._factor), o.uncertainty), np.full(10 * len(o.loose), LOOSE_STD), o.scale]
         )
         noise = Noise(o.ar, o.level[None], o.level[None], np.ones(len(o.ar)))
-        return grams([dataclasses.replace(rows, X=X)], noise, scale, len(self._always), 1).total()[:-1, :-1]
+        return grams([dataclasses.replace(rows, X=X)], noise, scale, 1)[0, :-1, :-1]
 
     def margin(self, added: np.ndarray, pair: Pair, *, exact: bool = False) -> float:
         """Log odds expected in favour of the true one of two explanations, whichever is true, the worse of the two.

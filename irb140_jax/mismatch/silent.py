@@ -1,4 +1,4 @@
-"""What competes with physics, is fitted like it, and is none that was left out: no finding bears its name."""
+"""Candidates that are no left-out physics: fitted and compared like effects, and never reported as findings."""
 
 from irb140_jax.effects import AbstractEffect
 

@@ -39,7 +39,8 @@ class Conditioned:
         usable: False where a joint rests (dry friction is undetermined there) or samples are missing, shape (T, n).
         rest_speed: Speed that encoder noise can't tell from rest, shape (n,).
         q_noise: Standard deviation of the logged positions' white noise [rad or m], shape (n,).
-        direction: sign(qd), and what stands for it near rest (see `direction_of`), shape (T, n).
+        direction: sign(qd), and what stands for it near rest (see `direction_of`), anti-aliased as the torque, shape
+            (T, n).
         unsure: Standard deviation of the low-passed torque that the samples leave open, shape (T, n): see `_between`.
         notes: Repairs, as sentences.
         began: Time of the log's first row [s]; the smoother leaves out the first samples.

@@ -9,7 +9,12 @@ def turning_points(q: np.ndarray) -> np.ndarray:
     """Indices of the samples at which one joint turns round, swings below `LEAST` of its range left out.
 
     Args:
-        q: Positions, shape (T,).
+        q: Positions [rad or m], shape (T,).
+
+    Returns:
+        Shape (turning points,), in order.
+
+    Source: A. Visintin, Differential Models of Hysteresis, 1994.
     """
     least, moved = LEAST * float(np.ptp(q)), np.diff(q)
     steps = np.flatnonzero(moved)
@@ -27,7 +32,7 @@ def turning_points(q: np.ndarray) -> np.ndarray:
 
 
 def turned_before(q: np.ndarray, turns: list[np.ndarray], start: int, count: int) -> np.ndarray:
-    """Positions at the last turning points of every joint before a sample, shape (count, n).
+    """Positions at the last turning points of every joint before a sample [rad or m], shape (count, n).
 
     Where there are fewer, the first sample stands before them.
 

@@ -1,4 +1,4 @@
-"""Columns of errors of the instrument, nuisance parameters with stated prior widths, and of the discrepancy."""
+"""Columns of the discrepancy and of nuisance parameters with stated prior widths, such as errors of the instrument."""
 
 import dataclasses
 from collections.abc import Sequence
