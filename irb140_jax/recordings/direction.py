@@ -6,6 +6,7 @@ of friction to the other, while the encoder shows no speed at all.
 """
 
 import numpy as np
+from scipy import ndimage
 
 REST = 0.1  # s that a joint must stay where it is to rest: a reversal takes less
 STICK = 0.04  # s of a reversal without speed by which it sticks: one that does not is faster through
@@ -32,11 +33,26 @@ def direction_of(
         The direction, from -1 to 1, shape (T, n).
     """
     out, sharp = np.tanh(qd / rest_speed), _mean_tanh(qd / noise, np.abs(qdd) / (2.0 * rate * noise))
-    signs = np.where(np.abs(qd) >= rest_speed, np.sign(qd), 0.0)
+    signs = np.where(slow(qd, qdd, rest_speed, rate), 0.0, np.sign(qd))
     for sign, through, direction in zip(signs.T, sharp.T, out.T, strict=True):
         if sign.any():
             _fill(sign, through, direction, int(REST * rate), int(STICK * rate))
     return out
+
+
+def slow(qd: np.ndarray, qdd: np.ndarray, rest_speed: np.ndarray, rate: float) -> np.ndarray:
+    """Where a joint may be at rest, shape (T, n).
+
+    Smoothing rings where a joint sticks or breaks free. A joint that goes through at the acceleration found beside it
+    is slower than the limit here for half of `STICK` only.
+
+    Args:
+        qd, qdd: Speeds and accelerations, shape (T, n).
+        rest_speed: Speed beneath which noise hides rest, shape (n,).
+        rate: Samples per second.
+    """
+    around = ndimage.maximum_filter1d(np.abs(qdd), 2 * int(STICK * rate) + 1, axis=0)
+    return np.abs(qd) < np.maximum(rest_speed, 0.25 * STICK * around)
 
 
 def _mean_tanh(x: np.ndarray, reach: np.ndarray) -> np.ndarray:
@@ -57,7 +73,10 @@ def _fill(sign: np.ndarray, sharp: np.ndarray, direction: np.ndarray, rest: int,
         direction[last:] = sign[last]
     for i in np.flatnonzero(np.diff(known) > 1):
         before, after = known[i], known[i + 1]
+        # It still takes a quarter of `stick` to come to rest from the speed at which it counts as slow.
+        held, free = before + stick // 4, after - stick // 4
         if after - before < stick:
             direction[before:after] = sharp[before:after]
-        elif sign[before] != sign[after] and after - before < rest:
-            direction[before:after] = np.linspace(sign[before], sign[after], after - before, endpoint=False)
+        elif sign[before] != sign[after] and free - held < rest:
+            direction[before:held], direction[free:after] = sign[before], sign[after]
+            direction[held:free] = np.linspace(sign[before], sign[after], free - held, endpoint=False)

@@ -1,7 +1,12 @@
-"""The noise of logged positions, and Wiener's smoother that takes it out before they are differentiated."""
+"""The noise of logged positions, and Wiener's smoother that takes it out before they are differentiated.
+
+What one joint does moves the others: an arm that sticks and breaks free at one joint shakes all of them, most of them
+by less than their encoders can tell.  Taken alone, such a joint would lose its part of the motion, and the torque that
+belongs to it.  So the smoother sees all joints together, through the cross-spectra of their positions.
+"""
 
 import numpy as np
-from scipy import ndimage, signal, special
+from scipy import signal, special
 from scipy.signal import windows
 
 from irb140_jax.recordings.recording import Recording
@@ -12,16 +17,17 @@ QUARTIC = 4  # the polynomial that tells the acceleration at an end ...
 ENDS = 0.5  # ... from so many periods of the highest frequency in the motion ...
 SHORTEST, LONGEST = 0.1, 1.0  # ... but not less, nor more [s]
 WINDOW = 4.0  # [s] of the spectrum's windows
-CERTAIN = 1.3  # times the noise that a spectrum must exceed before any of it counts as signal: its own scatter
-BINS = 5  # of the spectrum that are averaged ...
-FREEDOM = 4.2  # ... and how many degrees of freedom they have together in each of Kaiser's windows
-CHANCE = 1e-6  # with which noise alone is as high as the top of a run of frequencies that counts as signal
+BINS = 2  # of the spectrum on either side that are averaged at least ...
+BREADTH = 0.3  # ... and as a share of the frequency: spectra of motion are alike on a logarithmic scale
+CHANCE = 2.0  # scales of Tracy and Widom's law beyond the edge, which noise alone seldom reaches
+AT_ONCE = 1 << 14  # frequencies
+ROUNDING = 1e-12  # relative; below, eigenvalues are what rounding leaves
 
 
 def without_noise(
     q: np.ndarray, white: np.ndarray, rate: float, differentiators: tuple[np.ndarray, np.ndarray], *, resampled: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Wiener's smoother: every frequency of every joint's position weighted by the share of it that is signal.
+    """Wiener's smoother: of all joints' positions, at every frequency, the part that is signal.
 
     What is optimal for q is so for its derivatives too.  Without it, encoder noise between the motion's highest
     frequency and the band's would fill qdd.  Beyond its ends
@@ -38,41 +44,55 @@ def without_noise(
         Positions, with as many beyond either end as the differentiator reaches, shape (T + len(h1) - 1, n); and the
         standard deviation of the noise in their speeds and accelerations, shape (2, n).
 
-    Source: N. Wiener, Extrapolation, Interpolation and Smoothing of Stationary Time Series, 1949.
+    Source: N. Wiener, Extrapolation, Interpolation and Smoothing of Stationary Time Series, 1949, ch. 4.
     """
     half = (len(differentiators[0]) - 1) // 2
     reach = max(min(len(q) - 1, int(BEYOND * rate)), half)
-    out, noise = np.empty((len(q) + 2 * half, q.shape[1])), np.zeros((2, q.shape[1]))
-    f = np.fft.rfftfreq(len(q) + 2 * reach, 1.0 / rate)
-    for j in range(q.shape[1]):
-        share, floor, at = signal_share(q[:, j], white[j] if resampled else 0.0, rate)
-        longer = _goes_on(q[:, j], rate, reach, np.interp(f, at, share))
-        out[:, j] = longer[reach - half : reach + len(q) + half]
-        weight = np.interp(np.fft.rfftfreq(8192, 1.0 / rate), at, share)
-        # Jerks fill the top of the spectrum, but few samples.
-        floor = min(floor, white[j])
-        for k, taps in enumerate(differentiators):
-            response = np.abs(np.fft.rfft(taps, 8192)) * weight
-            noise[k, j] = np.sqrt(floor * np.sum(response**2) * rate / 8192)
-    return out, noise
+    weights, floor, at = signal_weights(q, white if resampled else np.zeros_like(white), rate)
+    longer = _goes_on(q, rate, reach, at, weights)
+    noise, coarse = np.zeros((2, q.shape[1])), np.fft.rfftfreq(8192, 1.0 / rate)
+    # Jerks fill the top of the spectrum, but few samples.
+    passed = np.abs(_interpolated(coarse, at, weights)) ** 2 @ np.minimum(floor, white)
+    for k, taps in enumerate(differentiators):
+        response = np.abs(np.fft.rfft(taps, 8192))
+        noise[k] = np.sqrt(response**2 @ passed * rate / 8192)
+    return longer[reach - half : reach + len(q) + half], noise
 
 
-def _goes_on(x: np.ndarray, rate: float, reach: int, weight: np.ndarray) -> np.ndarray:
-    """A position smoothed, with `reach` samples before and after that it most likely had, shape (T + 2 reach,).
+def _interpolated(f: np.ndarray, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Weights at other frequencies, shape (len(f), n, n)."""
+    i = np.clip(np.searchsorted(at, f, side="right") - 1, 0, len(at) - 2)
+    share = np.clip((f - at[i]) / (at[i + 1] - at[i]), 0.0, 1.0)[:, None, None]
+    return (1.0 - share) * weights[i] + share * weights[i + 1]
 
-    It is reflected about its ends, bent by twice the acceleration there, which a reflection would turn round: a step of
-    qdd fills the spectrum, and what the smoother takes from that rings for half a second.  What lies beyond the ends is
-    then replaced by what the smoother makes of it, a few times: expectation maximisation with missing samples.
+
+def _weighted(spectrum: np.ndarray, f: np.ndarray, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Spectra (F, n) of the signal in positions with these spectra; some frequencies at a time, for the memory."""
+    out = np.empty_like(spectrum)
+    for part in (slice(i, i + AT_ONCE) for i in range(0, len(f), AT_ONCE)):
+        out[part] = (_interpolated(f[part], at, weights) @ spectrum[part, :, None])[:, :, 0]
+    return out
+
+
+def _goes_on(x: np.ndarray, rate: float, reach: int, at: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Positions smoothed, with `reach` samples before and after that they most likely had, shape (T + 2 reach, n).
+
+    They are reflected about their ends, bent by twice the acceleration there, which a reflection would turn round: a
+    step of qdd fills the spectrum, and what the smoother takes from that rings for half a second.  What lies beyond the
+    ends is then replaced by what the smoother makes of it, a few times: expectation maximisation with missing samples.
     """
-    longer = np.pad(x, reach, mode="reflect", reflect_type="odd")
+    longer = np.pad(x, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
     seconds = np.arange(reach, 0, -1) / rate
     bent = seconds**2 * np.cos(0.5 * np.pi * seconds / seconds[0]) ** 2 if reach else seconds
-    longer[:reach] += _acceleration(x, rate) * bent
-    longer[len(longer) - reach :] += _acceleration(x[::-1], rate) * bent[::-1]
+    for j, own in enumerate(x.T):
+        longer[:reach, j] += _acceleration(own, rate) * bent
+        longer[len(longer) - reach :, j] += _acceleration(own[::-1], rate) * bent[::-1]
+    f = np.fft.rfftfreq(len(longer), 1.0 / rate)
     for _ in range(ROUNDS):
         longer[reach : reach + len(x)] = x
         trend = np.linspace(longer[0], longer[-1], len(longer))
-        longer = np.fft.irfft(np.fft.rfft(longer - trend) * weight, len(longer)) + trend
+        spectrum = np.fft.rfft(longer - trend, axis=0)
+        longer = np.fft.irfft(_weighted(spectrum, f, at, weights), len(longer), axis=0) + trend
     return longer
 
 
@@ -89,18 +109,53 @@ def _acceleration(x: np.ndarray, rate: float) -> float:
     return float(a * max(1.0 - variance / max(a**2, 1e-300), 0.0) * (rate / count) ** 2)
 
 
-def signal_share(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, float, np.ndarray]:
-    """Share of the signal in a position's power at each frequency, density of its white noise, frequencies [Hz]."""
-    f, p, floor = spectrum_of(x, density, rate)
-    smooth = np.maximum(ndimage.uniform_filter1d(p, BINS, mode="nearest"), 1e-300)
-    share = np.clip(1.0 - CERTAIN * floor / smooth, 0.0, 1.0)
-    share[f < 1.0] = 1.0  # below, windows of four seconds can't tell
-    # Of hundreds of frequencies some stand out by chance; differentiated twice, those would be what is loudest.
-    count = max(2 * len(x) // _window(x, rate) - 1, 1)  # windows; their median is less than their mean
-    sure = floor * 2 * count / special.chdtri(2 * count, 0.5) * special.chdtri(FREEDOM * count, CHANCE)
-    runs = np.cumsum(np.diff(share > 0.0, prepend=True))
-    top = np.asarray(ndimage.maximum(np.where(f < 1.0, np.inf, smooth), runs, np.arange(runs[-1] + 1)))
-    return np.where((top > sure / (FREEDOM * count))[runs], share, 0.0), floor, f
+def signal_weights(
+    q: np.ndarray, density: np.ndarray, rate: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Weights of Wiener's smoother for all joints together.
+
+    In units of their noise, cross-spectra of noise alone have eigenvalues near one, and those that stand out belong to
+    combinations of joints that move.  Of each the smoother keeps 1 - edge / eigenvalue.
+
+    Args:
+        q: Positions on an even grid, shape (T, n).
+        density: Power density of their white noise where it is known, shape (n,); else as seen at the spectrum's top.
+        rate: Samples per second.
+
+    Returns:
+        Weights of each joint's spectrum in each one's signal, shape (F, n, n); density of each joint's noise, shape
+        (n,); frequencies [Hz], shape (F,).
+
+    Source: the edge: I. M. Johnstone, On the distribution of the largest eigenvalue in principal components analysis,
+    Annals of Statistics 29(2), 2001.
+    """
+    n, length, window = q.shape[1], _window(q, rate), _taper(q, rate)
+    starts = range(0, len(q) - length + 1, max(length - length // 2, 1))
+    spectra = np.stack([np.fft.rfft(signal.detrend(q[s : s + length], axis=0) * window[:, None], axis=0)
+                        for s in starts])  # fmt: skip
+    P = 2.0 * np.einsum("kfi,kfj->fij", spectra, spectra.conj()) / (len(spectra) * rate * np.sum(window**2))
+    f = np.fft.rfftfreq(length, 1.0 / rate)
+    own = np.einsum("fii->fi", P).real
+    # An average of so many periodograms has a median below its mean.
+    middle = special.chdtri(2 * len(spectra), 0.5) / (2 * len(spectra))
+    floor = np.maximum(np.maximum(np.median(own[f > 0.6 * f[-1]], axis=0) / middle, density), 1e-300)
+    bins = np.arange(len(f))
+    reach = np.maximum(BINS, (BREADTH * bins).astype(int))
+    low, high = np.maximum(bins - reach, 0), np.minimum(bins + reach + 1, len(f))
+    total = np.concatenate([np.zeros((1, n, n)), np.cumsum(P, axis=0)])
+    smooth = (total[high] - total[low]) / (high - low)[:, None, None]
+    values, vectors = np.linalg.eigh(smooth / np.sqrt(floor[:, None] * floor))
+    values = np.maximum(values, ROUNDING * values[:, -1:])
+    # How many periodograms' worth each average is; the windows' taper widens a line to several bins.
+    width = length * np.sum(window**2) / np.sum(window) ** 2
+    count = np.maximum((high - low) / width, 1.0)[:, None] * len(spectra)
+    edge = (np.sqrt(count) + np.sqrt(n)) ** 2 / count
+    spread = (np.sqrt(count) + np.sqrt(n)) / count * (1.0 / np.sqrt(count) + 1.0 / np.sqrt(n)) ** (1.0 / 3.0)
+    share = np.clip(1.0 - (edge + CHANCE * spread) / np.maximum(values, 1e-300), 0.0, 1.0)
+    weights = np.einsum("fik,fk,fjk->fij", vectors, share, vectors.conj())
+    weights = np.sqrt(floor)[:, None] * weights / np.sqrt(floor)
+    weights[f < 1.0] = np.eye(n)  # windows of four seconds can't tell
+    return weights, floor, f
 
 
 def _window(x: np.ndarray, rate: float) -> int:
@@ -108,10 +163,14 @@ def _window(x: np.ndarray, rate: float) -> int:
     return min(len(x), int(WINDOW * rate))
 
 
+def _taper(x: np.ndarray, rate: float) -> np.ndarray:
+    """Window of the spectrum: one that keeps strong slow motion out of the high frequencies."""
+    return windows.kaiser(_window(x, rate), 14.0)
+
+
 def spectrum_of(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Frequencies [Hz], power density of a position, and that of its white noise: as known, or as seen at the top."""
-    window = windows.kaiser(_window(x, rate), 14.0)
-    f, p = signal.welch(x, rate, window=window, detrend="linear")
+    f, p = signal.welch(x, rate, window=_taper(x, rate), detrend="linear")
     return f, p, max(float(np.median(p[f > 0.6 * f[-1]])), density)
 
 
