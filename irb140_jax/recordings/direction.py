@@ -76,7 +76,8 @@ def _fill(sign: np.ndarray, sharp: np.ndarray, direction: np.ndarray, rest: int,
         # It still takes a quarter of `stick` to come to rest from the speed at which it counts as slow.
         held, free = before + stick // 4, after - stick // 4
         if after - before < stick:
-            direction[before:after] = sharp[before:after]
+            turns = sign[before] != sign[after]
+            direction[before:after] = sharp[before:after] if turns else sign[before]
         elif sign[before] != sign[after] and free - held < rest:
             direction[before:held], direction[free:after] = sign[before], sign[after]
             direction[held:free] = np.linspace(sign[before], sign[after], free - held, endpoint=False)
