@@ -186,7 +186,8 @@ def delay(plant, sizes, rng, j, torque):
 def skew(plant, sizes, rng, j, torque):
     """Every torque channel late by a time of its own, up to 6 ms."""
     plant.late = plant.late + rng.uniform(0.0, 0.006, plant.arm.n)
-    plant.hidden.append(Hidden("skew", None, tuple(range(plant.arm.n)), {}, ("time_delay",), (), unnamed=True))
+    either = ("time_delay", "channel_skew")
+    plant.hidden.append(Hidden("skew", None, tuple(range(plant.arm.n)), {}, either, (), unnamed=True))
 
 
 def gain(plant, sizes, rng, j, torque):

@@ -101,6 +101,14 @@ FOUR = (  # Gauss and Legendre's points and weights
     (-0.8611363115940526, 0.3478548451374538), (-0.3399810435848563, 0.6521451548625461),
     (0.3399810435848563, 0.6521451548625461), (0.8611363115940526, 0.3478548451374538),
 )  # fmt: skip
+def shifted(p, m):
+    """What a delay of all torques adds, by Gauss and Legendre's rule."""
+    at = [m.t + 0.5 * (1.0 + u) * p["delay"] for u, _ in FOUR]
+    slopes = [sum(0.5 * w * np.interp(x, m.t, rate) for x, (_, w) in zip(at, FOUR, strict=True))
+              for rate in np.asarray(m.asked_rate).T]  # fmt: skip
+    return p["delay"] * np.stack(slopes, axis=1)
+
+
 LAWS_OF_MOTION = {
     "thermal_friction_drift": lambda p, m, j: AT(m.qd, j) * p["viscous_cold"] * (
         1 - p["relative_drop"] * (1 - np.exp(-np.asarray(m.t)[:, None] / p["time_constant"]))),
@@ -109,9 +117,8 @@ LAWS_OF_MOTION = {
     "presliding_hysteresis": lambda p, m, j: dahl(p, AT(m.q, j)),
     "torque_ripple": lambda p, m, j: p["amplitude"] * np.sin(2 * np.pi * p["cycles_per_rad"] * AT(m.q, j)),
     "actuator_lag": lambda p, m, j: p["time_constant"] * AT(m.scaled_rate, j),
-    "time_delay": lambda p, m, j: p["delay"] * np.stack(
-        [sum(0.5 * w * np.interp(m.t + 0.5 * (1.0 + u) * p["delay"], m.t, x) for u, w in FOUR)
-         for x in np.asarray(m.asked_rate).T], axis=1),
+    "time_delay": lambda p, m, j: shifted(p, m),
+    "channel_skew": lambda p, m, j: shifted(p, m)[:, [j]],
     "gravity_spring": lambda p, m, j: p["stiffness"] * (AT(m.q, j) - p["rest"]),
     "gravity_tilt": lambda p, m, j: p["tilt"] * float(m.rigid.gravity) * (m.rigid.by_gravity @ m.rigid.across[0]),
     "payload": lambda p, m, j: p["mass"] * np.asarray(m.rigid.held)[:, :, 0],

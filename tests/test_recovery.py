@@ -3,6 +3,7 @@
 The diagnosis gets a model and recordings; the truth stays here.
 """
 
+import dataclasses
 from functools import cache
 
 import numpy as np
@@ -41,6 +42,7 @@ HIDDEN_ON = {
     "external_wrench": (),
 }
 NOT_ON_THIS_MACHINE = {
+    "channel_skew": "MuJoCo has one clock: it is hidden below",
     "payload": "its weight is within what the last link's own inertials may err by",
     "encoder_offset": "gravity has no slope on any of its joints",
     "joint_elasticity": "no softer than 8 Hz, it is a hundredth of the torque",
@@ -119,6 +121,25 @@ def test_a_wall_is_found_where_it_stands_by_an_arm_that_feels_all_directions():
     # A degree and two millimetres: what 2e-5 rad of encoder noise and a low-pass leave is below both.
     assert sum(found[f"normal_{k}"] * wall[f"normal_{k}"] for k in "xyz") > np.cos(np.radians(1.0))
     assert found["position"] == pytest.approx(wall["position"], abs=2e-3)
+
+
+@pytest.mark.parametrize("late", [0.006, -0.009])
+def test_a_torque_channel_out_of_step_is_named_and_corrected(late):
+    robot, case = machine(6, 3, 0.3)
+    behind = lambda r: np.interp(r.t - late, r.t, r.tau[:, 1])  # noqa: E731
+    skewed = [dataclasses.replace(r, tau=np.stack([r.tau[:, 0], behind(r), r.tau[:, 2]], axis=1))
+              for r in case.recordings]  # fmt: skip
+    diagnosis = diagnose(robot, skewed).diagnosis
+    (finding,) = diagnosis["findings"]
+    assert finding["joints"] == [robot.joint_names[1]]
+    if late < 0.0:  # a drive's torque comes late after the logged one too, and slow motion can't tell
+        assert "channel_skew" in {finding["effect"], *(a["effect"] for a in finding["alternatives"])}
+        return
+    assert finding["effect"] == "channel_skew"
+    # Half a millisecond between channels is usual, and is not counted as skew.
+    assert finding["parameters"]["delay"]["value"] == pytest.approx(-late, abs=1e-3)
+    fit = diagnosis["fit"][robot.joint_names[1]]
+    assert fit["rmse_corrected"] < 1.3 * fit["noise_floor"] and fit["rmse_refit"] > 3.0 * fit["rmse_corrected"]
 
 
 def test_the_corrected_model_predicts_other_moves_of_the_machine():

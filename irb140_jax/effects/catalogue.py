@@ -13,12 +13,13 @@ def _found() -> dict[str, AbstractEffect]:
         if module.name == "catalogue":
             continue
         for value in vars(importlib.import_module(f"{effects.__name__}.{module.name}")).values():
-            is_effect = isinstance(value, type) and issubclass(value, AbstractEffect) and value is not AbstractEffect
-            if not is_effect or value.__module__ != f"{effects.__name__}.{module.name}":
+            is_effect = isinstance(value, type) and issubclass(value, AbstractEffect)
+            is_final = is_effect and not value.__name__.startswith("Abstract")
+            if not is_final or value.__module__ != f"{effects.__name__}.{module.name}":
                 continue
             if value.slug in catalogue:
                 raise TypeError(f"two effects share the slug {value.slug!r}: {catalogue[value.slug]} and {value}")
-            catalogue[value.slug] = value()  # pyright: ignore[reportAbstractUsage]: not the base class, see above
+            catalogue[value.slug] = value()  # pyright: ignore[reportAbstractUsage]: final, see above
     return catalogue
 
 

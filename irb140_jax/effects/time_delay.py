@@ -1,73 +1,28 @@
 """Time delay: the torque and position channels of the log are shifted in time against each other."""
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter
-
-HALVES = tuple(0.001 * k for k in range(-16, 17))  # s: half of the delays that are tried first
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # on -1 to 1: slopes whose mean is that over the delay
+from irb140_jax.effects.delay import AbstractDelay, mean_slopes
 
 
-class TimeDelay(AbstractEffect):
-    """q_logged(t) = q(t - delay): the logged torque belongs to a later motion, tau(t + delay).
-
-    tau(t + delay) - tau(t) is delay times the mean slope from t to t + delay; the shape is half of the time over which
-    that is taken, and where that is not half the delay, it is right to first order.
-    """
+class TimeDelay(AbstractDelay):
+    """One delay between all torques and all positions; see `AbstractDelay`."""
 
     slug = "time_delay"
     title = "a time delay between torque and position"
     equation = "tau(t + delay) - tau(t) on every joint"
-    source = "Ljung, System Identification, 1999, ch. 4"
-    parameters = (Parameter("delay", "s"),)
-    variants = ((0,),)
     confused_with = {
         "actuator_lag": "fast motion of several joints: a delay is the same for all of them",
         "viscous_friction": "the same move at two frequencies: the phase shift of a delay grows with frequency",
     }
-    logged = 3
     needs = "fast motion of several joints"
     everywhere = True
-    history = "is a shift between the clocks of the log, which pairs each torque with an earlier position"
-    not_in_mjcf = "it belongs to the clocks of the log, not to the arm"
 
     def sites(self, robot):
         return np.arange(robot.n)[None, :]
 
-    def shapes(self, scales, joints):
-        return np.array(HALVES)[:, None]
-
-    def refines(self):
-        return True
-
-    def finer(self, grid, best):
-        step = np.min(np.diff(np.sort(grid[:, 0])))
-        return best[0] + np.linspace(-step, step, len(grid))[:, None]
-
     def columns(self, motion, joints, shape):
-        def mean_slope(x):
-            at = motion.t + shape[0] * (1.0 + NODES[:, None])
-            return 0.5 * WEIGHTS @ jnp.interp(at, motion.t, x)
-
-        return jax.vmap(mean_slope, in_axes=1, out_axes=1)(motion.asked_rate)[:, :, None]
-
-    def at_shape(self, shape):
-        # The slope is taken over the delay itself, give or take the spacing of the delays that are tried.
-        spacing = 2.0 * (HALVES[1] - HALVES[0])
-        return 2.0 * shape - spacing, 2.0 * shape + spacing
-
-    def passed_on(self, x, dt, w, shape):
-        t, slope = dt * np.arange(len(x)), np.gradient(x, dt, axis=0)
-        at = t + shape[0] * (1.0 + NODES[:, None])
-        return w[0] * np.stack([0.5 * WEIGHTS @ np.interp(at, t, s) for s in slope.T], axis=1)
-
-    def physical(self, w, shape):
-        return w
-
-    def amplitudes(self, values):
-        return np.array([values["delay"]]), np.array([0.5 * values["delay"]])
+        return mean_slopes(motion.t, motion.asked_rate, shape[0])[:, :, None]
 
     def where(self, names, values, units):
         return f"{names}: positions are logged {1e3 * values['delay']:.3g} ms after the torque they belong to"

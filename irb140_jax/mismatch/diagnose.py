@@ -27,7 +27,7 @@ from irb140_jax.mismatch.explanation import Explanation, fitted
 from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding, torque_scale_odds
 from irb140_jax.mismatch.model import CorrectedModel, Named, scaled, torques_along
 from irb140_jax.mismatch.native import native_gap
-from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, notes, skew_notes
+from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, notes
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, refitted
 from irb140_jax.mismatch.provenance import provenance
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
@@ -147,7 +147,7 @@ def _diagnosed(
     origin = provenance(robot, recordings, config.options, config.words)
     missing = undecidable(robot, proof, logged, scatter, band)
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
-    unnamed = [*friction_notes(ex, [r.source for r in smooth]), *skew_notes(ex), *discrepancy_notes(robot, proof)]
+    unnamed = [*friction_notes(ex, [r.source for r in smooth]), *discrepancy_notes(robot, proof)]
     coarse = coarse_positions(robot, *parts, proof.judged)
     said = [*open_joints, *unnamed, *coarse, *twice, *again, *usual, *gap]
     every = [*found, *torque_scale_finding(robot, ex)]

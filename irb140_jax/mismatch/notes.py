@@ -3,18 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
 
 from irb140_jax.mismatch.explanation import Explanation
 from irb140_jax.mismatch.prove import HeldOut
-from irb140_jax.mismatch.regression.nuisances import DELAY_JOINT, FIXED, SCALED
+from irb140_jax.mismatch.regression.nuisances import SCALED
 from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
 SLOPE = SCALED.index("slope")
-FAR = 3.0  # prior standard deviations from which an error of the instrument is a finding of its own
 NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
 
 
@@ -88,31 +86,6 @@ def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
             each = (own[j] * ex.extra[0].units[j])[slopes]
             said = ", ".join(f"{x:+.3g} {unit} in {name}" for x, name in zip(each, names, strict=True))
             out.append(f"Friction of {ex.lib.robot.joint_names[j]} differs between the recordings: {said}.")
-    return out
-
-
-def skew_notes(ex: Explanation) -> list[str]:
-    """A note for every joint whose torque is logged early or late beside its position, by more than channels may be.
-
-    Its odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
-    any rare effect.
-
-    Args:
-        ex: The explanation.
-    """
-    out, delay = [], FIXED.index("delay")
-    mean, _ = ex.space.posterior(ex.chosen, ex.settings)
-    columns = ex.space.set_columns(ex.chosen)
-    for j, (g, setting) in enumerate(zip(ex.space.joints, ex.settings, strict=True)):
-        own = ex.space.own(j, setting, columns, mean, instrument=True)[delay]
-        spread = g.at(setting).spread()[delay]
-        odds = stats.norm.logpdf(0.0) - stats.norm.logpdf(0.0, own, spread) + np.log(RARE)
-        if odds > 0.0 and abs(own) > FAR:
-            out.append(
-                f"Torque of {ex.lib.robot.joint_names[j]} is logged {1e3 * DELAY_JOINT * abs(own):.2g} +- "
-                f"{1e3 * DELAY_JOINT * spread:.1g} ms {'early' if own > 0.0 else 'late'} beside its position and the "
-                "other joints'; this is taken into account."
-            )
     return out
 
 

@@ -19,6 +19,7 @@ SHORTEST, LONGEST = 0.1, 1.0  # ... but not less, nor more [s]
 WINDOW = 4.0  # [s] of the spectrum's windows
 BINS = 2  # of the spectrum on either side that are averaged at least ...
 BREADTH = 0.3  # ... and as a share of the frequency: spectra of motion are alike on a logarithmic scale
+FEW = 10  # lowest lines of the spectrum, all signal: noise there is differentiated to next to nothing
 CHANCE = 2.0  # scales of Tracy and Widom's law beyond the edge, which noise alone seldom reaches
 AT_ONCE = 1 << 14  # frequencies
 ROUNDING = 1e-12  # relative; below, eigenvalues are what rounding leaves
@@ -154,7 +155,7 @@ def signal_weights(
     share = np.clip(1.0 - (edge + CHANCE * spread) / np.maximum(values, 1e-300), 0.0, 1.0)
     weights = np.einsum("fik,fk,fjk->fij", vectors, share, vectors.conj())
     weights = np.sqrt(floor)[:, None] * weights / np.sqrt(floor)
-    weights[f < 1.0] = np.eye(n)  # windows of four seconds can't tell
+    weights[:FEW] = np.eye(n)
     return weights, floor, f
 
 

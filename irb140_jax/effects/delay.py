@@ -1,0 +1,61 @@
+"""A clock's error: the logged torque belongs to another instant than the positions logged with it."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.base import AbstractEffect, Parameter
+
+HALVES = tuple(0.001 * k for k in range(-16, 17))  # s: half of the delays that are tried first
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # on -1 to 1: slopes whose mean is that over the delay
+
+
+class AbstractDelay(AbstractEffect):
+    """q_logged(t) = q(t - delay): the logged torque belongs to a later motion, tau(t + delay).
+
+    tau(t + delay) - tau(t) is delay times the mean slope from t to t + delay; the shape is half of the time over which
+    that is taken, and where that is not half the delay, it is right to first order.
+    """
+
+    source = "Ljung, System Identification, 1999, ch. 4"
+    parameters = (Parameter("delay", "s"),)
+    variants = ((0,),)
+    logged = 3
+    history = "is a shift between the clocks of the log, which pairs each torque with an earlier position"
+    not_in_mjcf = "it belongs to the clocks of the log, not to the arm"
+
+    def shapes(self, scales, joints):
+        return np.array(HALVES)[:, None]
+
+    def refines(self):
+        return True
+
+    def finer(self, grid, best):
+        step = np.min(np.diff(np.sort(grid[:, 0])))
+        return best[0] + np.linspace(-step, step, len(grid))[:, None]
+
+    def at_shape(self, shape):
+        # The slope is taken over the delay itself, give or take the spacing of the delays that are tried.
+        spacing = 2.0 * (HALVES[1] - HALVES[0])
+        return 2.0 * shape - spacing, 2.0 * shape + spacing
+
+    def passed_on(self, x, dt, w, shape):
+        t, slope = dt * np.arange(len(x)), np.gradient(x, dt, axis=0)
+        at = t + shape[0] * (1.0 + NODES[:, None])
+        return w[0] * np.stack([0.5 * WEIGHTS @ np.interp(at, t, s) for s in slope.T], axis=1)
+
+    def physical(self, w, shape):
+        return w
+
+    def amplitudes(self, values):
+        return np.array([values["delay"]]), np.array([0.5 * values["delay"]])
+
+
+def mean_slopes(t: jax.Array, rate: jax.Array, half: jax.Array) -> jax.Array:
+    """Mean of rates (T, k) over twice a time from each instant on, shape (T, k)."""
+
+    def mean(x):
+        at = t + half * (1.0 + NODES[:, None])
+        return 0.5 * WEIGHTS @ jnp.interp(at, t, x)
+
+    return jax.vmap(mean, in_axes=1, out_axes=1)(rate)
