@@ -120,6 +120,10 @@ class AbstractEffect(abc.ABC):
         """As many grid points as before, around the best one (by default one parameter; see `between_neighbours`)."""
         return between_neighbours(grid, best)
 
+    def shape_of(self, w: np.ndarray, shape: np.ndarray) -> np.ndarray:
+        """The shape that amplitudes w found at a shape call for; by default they say nothing about it."""
+        return shape
+
     def during(self, shape: np.ndarray) -> tuple[int, float, float]:
         """Index of the recording in which what happens `once` happens, from when and until when [s]."""
         raise NotImplementedError(f"{self.slug} doesn't happen once")

@@ -34,6 +34,9 @@ class AbstractDelay(AbstractEffect):
         step = np.min(np.diff(np.sort(grid[:, 0])))
         return best[0] + np.linspace(-step, step, len(grid))[:, None]
 
+    def shape_of(self, w, shape):
+        return 0.5 * w
+
     def at_shape(self, shape):
         # The slope is taken over the delay itself, give or take the spacing of the delays that are tried.
         spacing = 2.0 * (HALVES[1] - HALVES[0])

@@ -9,7 +9,7 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
 from irb140_jax.mismatch.assemble import BLOCKS, assemble
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
-from irb140_jax.mismatch.explanation import Explanation, fitted
+from irb140_jax.mismatch.explanation import Explanation, fitted, parts
 from irb140_jax.mismatch.model import Named, Torques, better_known, composed
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
@@ -144,6 +144,9 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
     """Finer grids of shapes around the best ones, grids that the residual suggests, the set with the best shapes."""
     left = left_over(ex.data, ex.columns(), ex.noise.total)
     shapes, best = [], {i: ex.data.candidates[i].shape for i in ex.chosen}
+    post = ex.posterior()
+    w = post.mean * ex.data.scale[post.columns]
+    amplitudes = {i: w[part] for i, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True)}
     for effect, sites, old, _ in ex.lib.blocks:
         new = old.copy()
         for s, joints in enumerate(sites):
@@ -151,7 +154,7 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
                     == (effect.slug, tuple(joints))]  # fmt: skip
             if mine and effect.refines():
                 best[mine[0]], peak = _peak(ex, mine[0])
-                new[s] = effect.finer(old[s], peak)
+                new[s] = effect.finer(old[s], effect.shape_of(amplitudes[mine[0]], peak))
             elif effect.scouts and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)

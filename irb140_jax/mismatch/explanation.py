@@ -68,10 +68,15 @@ class Explanation:
         return tuple(c for c in self.chosen if c != index)
 
     def log_posterior(self, chosen: Sequence[int], joints: Sequence[int] | None = None) -> float:
-        """Log posterior of a set, sizes and levels fitted to it anew, at some joints or all."""
-        key = frozenset(chosen)
-        known = self.sets.get(key)
-        return self.space.settled(tuple(sorted(key)), self.settings, joints)[0] if known is None else known
+        """Log posterior of a set, sizes and levels fitted to it anew, at some joints or all.
+
+        Without a member, others may have another shape.
+        """
+        value, members = -np.inf, tuple(sorted(chosen))
+        for other in dict.fromkeys((members, self.space.reshaped(members, self.settings))):
+            known = self.sets.get(frozenset(other))
+            value = max(value, self.space.settled(other, self.settings, joints)[0] if known is None else known)
+        return value
 
     def gains(self, chosen: tuple[int, ...], which: Sequence[int]) -> np.ndarray:
         """Log posterior odds of adding each of some candidates to a set, -inf where inadmissible."""

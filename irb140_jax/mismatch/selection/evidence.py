@@ -272,6 +272,16 @@ class Space:
         every = self.with_y(self.set_columns(chosen))
         return self._impossible(chosen, self.gram(settings, every, every))
 
+    def reshaped(self, chosen: Sequence[int], settings: Settings) -> tuple[int, ...]:
+        """The set with the best other shape for each member whose amplitudes can't be at its own, where there is one."""
+        now = list(chosen)
+        for c in self.inadmissible(chosen, settings):
+            rest = tuple(i for i in now if i != c)
+            gains = self.gains(rest, settings, np.array(self._alike[c]))
+            if np.isfinite(gains).any():
+                now = [*rest, self._alike[c][int(np.argmax(gains))]]
+        return tuple(sorted(now))
+
     def _impossible(self, chosen: Sequence[int], H: np.ndarray) -> list[int]:
         """The same, from the Gram matrix of a set's columns and y."""
         if not len(chosen):

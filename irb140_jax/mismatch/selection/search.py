@@ -86,12 +86,17 @@ class Search:
     def _possible(
         self, chosen: frozenset[int], settings: Settings, joints: Iterable[int] | None
     ) -> frozenset[int]:
-        """A set, judged, or what is left of it without members whose amplitudes can't be: those would be zero."""
+        """A set, judged, with other shapes of members whose amplitudes can't be at theirs, or without those members."""
+        seen: set[frozenset[int]] = set()
         while not np.isfinite(self.judged(chosen, settings, joints)):
-            without = chosen - set(self.space.inadmissible(tuple(sorted(chosen)), self.visited[chosen][1]))
-            if without == chosen:
+            seen.add(chosen)
+            members, at = tuple(sorted(chosen)), self.visited[chosen][1]
+            other = frozenset(self.space.reshaped(members, at))
+            if other in seen:
+                other = chosen - set(self.space.inadmissible(members, at))
+            if other in seen:
                 break
-            chosen = without
+            chosen = other
         return chosen
 
     def screened(self, chosen: frozenset[int], joint: int, most: int = BEST, least: float = -np.inf) -> list[int]:
