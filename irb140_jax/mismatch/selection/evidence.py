@@ -273,7 +273,7 @@ class Space:
         return self._impossible(chosen, self.gram(settings, every, every))
 
     def reshaped(self, chosen: Sequence[int], settings: Settings) -> tuple[int, ...]:
-        """The set with the best other shape for each member whose amplitudes can't be at its own, where there is one."""
+        """The set with the best other shape for each member whose amplitudes can't be at its own, if there is one."""
         now = list(chosen)
         for c in self.inadmissible(chosen, settings):
             rest = tuple(i for i in now if i != c)
