@@ -21,8 +21,8 @@ from helpers_cli import MODEL, recording, refused, stub, table  # noqa: F401
 import irb140_jax.mismatch
 import irb140_jax.recordings
 from irb140_jax import cli
-from irb140_jax.cli.diagnose import STEPS
 from irb140_jax.cli.commands import word
+from irb140_jax.cli.diagnose import STEPS
 from irb140_jax.cli.parsing import parsed
 from irb140_jax.cli.shown import Share
 from irb140_jax.errors import InputError
