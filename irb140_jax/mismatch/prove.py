@@ -52,7 +52,7 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     A motion that all but alone moves some joint, or all but alone holds what a finding does, is left out block by
     block, too: without it nothing is known there, and a wall that is touched once would drown all else.
     """
-    recording = _recordings(ex)
+    recording = recordings_of_blocks(ex)
     out, weight = [], np.vstack([np.stack([g.rows for g in ex.space.joints]), _energy(ex, ex.chosen)])
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
     of_recording = np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches])
@@ -64,7 +64,7 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     return out
 
 
-def _recordings(ex: Explanation) -> np.ndarray:
+def recordings_of_blocks(ex: Explanation) -> np.ndarray:
     """Recording of each block, shape (blocks,)."""
     return np.repeat([s.recording for s in ex.data.stretches], BLOCKS)
 
@@ -132,7 +132,7 @@ def _noise_left(stretches: list[Stretch], scale: np.ndarray, noise: Noise) -> No
 
 def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     """Residuals of the rival models, each row predicted from the other motions (or blocks)."""
-    data, energy, recording = ex.data, _energy(ex, ex.chosen), _recordings(ex)
+    data, energy, recording = ex.data, _energy(ex, ex.chosen), recordings_of_blocks(ex)
     seen = ex.posterior(instrument=False).mean
     bare = [s.of_rigid_body(refit.columns) for s in data.stretches]
     out = {"refit": [s.y.copy() for s in bare], "named": [s.y.copy() for s in data.stretches]}
@@ -157,6 +157,14 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     nominal, use, better = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches], gain > 0.0
     carried = [np.where(better, f, c) for f, c in zip(out["flexible"], out["named"], strict=True)]
     return HeldOut(nominal, out["refit"], out["named"], carried, use, better)
+
+
+def unseen_prediction(ex: Explanation, fold: np.ndarray) -> tuple[Posterior, float]:
+    """What predicts the blocks of a fold, as in `held_out`: inertials and amplitudes, and the torque scale less one."""
+    post, scale, _ = ex.prediction(fold)
+    seen = ex.posterior(instrument=False).mean
+    mean = np.where(_only_here(ex, ex.chosen, _energy(ex, ex.chosen), fold), seen, post.mean)
+    return dataclasses.replace(post, mean=mean), scale
 
 
 def held_out_gains(ex: Explanation) -> dict[int, float]:
