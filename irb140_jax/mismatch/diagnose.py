@@ -31,7 +31,7 @@ from irb140_jax.mismatch.motion import proof_in_motion
 from irb140_jax.mismatch.motion.windows import spans
 from irb140_jax.mismatch.native import native_gap
 from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, notes, skew_notes
-from irb140_jax.mismatch.prove import HeldOut, Refit, folds, held_out, recordings_of_blocks, refitted, unseen_prediction
+from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, recordings_of_blocks, refitted
 from irb140_jax.mismatch.provenance import provenance
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.regression.nuisances import feature_coefficients
@@ -157,25 +157,24 @@ def _diagnosed(
     diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
-    motion = _motion(robot, ex, refit, band, smooth, recordings)
+    motion = _motion(robot, ex, proof, refit.loose, band, smooth, recordings)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said) | {"motion": motion}, open_)
 
 
 def _motion(
-    robot: Robot, ex: Explanation, refit: Refit, band: Band, smooth: Sequence[Conditioned],
+    robot: Robot, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], band: Band, smooth: Sequence[Conditioned],
     recordings: Sequence[Recording],
 ) -> dict[str, Any] | None:  # fmt: skip
     """The proof in motion; None where a joint's torque was lost, so that nothing can be simulated."""
     if any(r.torque_lost is not None and r.torque_lost.any() for r in recordings):
         return None
-    left_out = folds(ex)
-    unseen = spans(left_out, recordings_of_blocks(ex), [s.t for s in ex.data.stretches])
+    unseen = spans([fold.blocks for fold in proof.folds], recordings_of_blocks(ex), [s.t for s in ex.data.stretches])
 
     def of_fold(k: int) -> CorrectedModel:
-        post, scale = unseen_prediction(ex, left_out[k])
-        return _fitted_model(robot, ex, refit.posterior(left_out[k]), refit.loose, post, scale, band)
+        fold = proof.folds[k]
+        return _fitted_model(robot, ex, fold.refit, loose, fold.corrected, fold.scale, band)
 
-    return rounded(proof_in_motion(of_fold, unseen, smooth))
+    return rounded(proof_in_motion(robot, of_fold, unseen, smooth))
 
 
 def _nothing_compared(

@@ -16,6 +16,23 @@ SETTLED = 2  # rounds in which the noise and what leaves it agree
 
 
 @dataclasses.dataclass(frozen=True)
+class Fold:
+    """What is left out together, and what the other blocks say.
+
+    Attributes:
+        blocks: Which blocks are left out, shape (blocks,).
+        refit: Inertials without effects.
+        corrected: Inertials and amplitudes of the findings.
+        scale: Torque scale less one.
+    """
+
+    blocks: np.ndarray
+    refit: Posterior
+    corrected: Posterior
+    scale: float
+
+
+@dataclasses.dataclass(frozen=True)
 class HeldOut:
     """Residuals on rows that the fit behind them did not see, one array (R, n) per recording [N m or N].
 
@@ -26,6 +43,7 @@ class HeldOut:
         corrected: The same, with the discrepancy where it is carried.
         use: Rows that count, (R, n).
         carried: Joints at which the discrepancy makes the error on unseen data smaller, shape (n,).
+        folds: The fits behind them.
     """
 
     nominal: list[np.ndarray]
@@ -34,6 +52,7 @@ class HeldOut:
     corrected: list[np.ndarray]
     use: list[np.ndarray]
     carried: np.ndarray
+    folds: tuple[Fold, ...] = ()
 
     @property
     def judged(self) -> np.ndarray:
@@ -137,11 +156,13 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     bare = [s.of_rigid_body(refit.columns) for s in data.stretches]
     out = {"refit": [s.y.copy() for s in bare], "named": [s.y.copy() for s in data.stretches]}
     out["flexible"] = [s.y.copy() for s in data.stretches]
-    gain = np.zeros(len(ex.settings))
+    gain, fits = np.zeros(len(ex.settings)), []
     for fold in folds(ex):
         post, scale, own = ex.prediction(fold)
-        corrected = np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean) * data.scale[post.columns]
-        inertial = refit.posterior(fold).mean * data.scale[refit.columns]
+        post = dataclasses.replace(post, mean=np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean))
+        fits.append(Fold(fold, refit.posterior(fold), post, scale))
+        corrected = post.mean * data.scale[post.columns]
+        inertial = fits[-1].refit.mean * data.scale[refit.columns]
         for r, s in enumerate(data.stretches):
             mine = fold[recording == s.recording]
             edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
@@ -156,15 +177,7 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
                 gain += np.sum(old**2 - new**2, axis=0)
     nominal, use, better = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches], gain > 0.0
     carried = [np.where(better, f, c) for f, c in zip(out["flexible"], out["named"], strict=True)]
-    return HeldOut(nominal, out["refit"], out["named"], carried, use, better)
-
-
-def unseen_prediction(ex: Explanation, fold: np.ndarray) -> tuple[Posterior, float]:
-    """What predicts the blocks of a fold, as in `held_out`: inertials and amplitudes, and the torque scale less one."""
-    post, scale, _ = ex.prediction(fold)
-    seen = ex.posterior(instrument=False).mean
-    mean = np.where(_only_here(ex, ex.chosen, _energy(ex, ex.chosen), fold), seen, post.mean)
-    return dataclasses.replace(post, mean=mean), scale
+    return HeldOut(nominal, out["refit"], out["named"], carried, use, better, tuple(fits))
 
 
 def held_out_gains(ex: Explanation) -> dict[int, float]:

@@ -34,7 +34,7 @@ def positions(
     """Joint positions of motions under torques, one model each, from start to end [rad or m].
 
     MuJoCo's steps are semi-implicit.  With speeds half a step before the start they are those of the leapfrog, whose
-    error goes with the square of the step; so they are given that way.
+    error goes with the square of the step; so they are given that way.  What flies away is infinite from then on.
 
     Args:
         models: From `simulated_model`, all of one robot.
@@ -51,7 +51,8 @@ def positions(
         state, _ = rollout.rollout(list(models), threads, start, np.ascontiguousarray(tau), control_spec=spec)
     finally:
         mujoco.set_mju_user_warning(None)
-    return np.concatenate([q[:, None], state[..., 1 : 1 + n]], axis=1)
+    ended = np.diff(state[..., :1], axis=1, prepend=0.0) <= 0.0  # MuJoCo gave up: time stands still
+    return np.concatenate([q[:, None], np.where(ended, np.inf, state[..., 1 : 1 + n])], axis=1)
 
 
 def tool_positions(model: mujoco.MjModel, q: Float[np.ndarray, "... n"]) -> Float[np.ndarray, "... 3"]:

@@ -8,6 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from irb140_jax.report import figures, text
+from irb140_jax.report.motion import motion_section
 from irb140_jax.report.next_steps import next_steps
 from irb140_jax.report.overview import overview
 from irb140_jax.report.pages import PAGE, template
@@ -50,6 +51,7 @@ def html_report(
         maps=[{"joint": joint, **figures.map_pair(data)} for joint, data in known["maps"].items()],
         panels=[figures.panel(joint, units[joint], known["motions"]) for joint in joints if known["motions"]],
         spectra=[figures.spectrum(joint, data, units[joint]) for joint, data in known["residual_spectrum"].items()],
+        motion=motion_section(known["motion"]) if known.get("motion") else None,
         ranking=_bars(known["ranking"]),
         models=MODELS,
         first_joint=_first_joint(diagnosis, joints),

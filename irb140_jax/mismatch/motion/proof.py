@@ -1,27 +1,30 @@
 """Motion error over the horizon: from recorded starts under recorded torque, against where the robot went."""
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from irb140_jax.mismatch.model import CorrectedModel
-from irb140_jax.mismatch.motion.models import MODELS, Simulated, simulated
+from irb140_jax.mismatch.motion.models import MODELS, Simulated, compiled_robot, leading, led, simulated
 from irb140_jax.mismatch.motion.told import sentences
 from irb140_jax.mismatch.motion.windows import FINEST, LONGEST, Span, Window, windows
 from irb140_jax.oracle.rollout import positions, tool_positions
 from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.robot import Robot
 
 SCHEMA = 1  # of motion.json
 TIMES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)  # [s] of the horizon at which errors are kept
 
 
 def proof_in_motion(
-    of_fold: Callable[[int], CorrectedModel], unseen: Sequence[Span], recordings: Sequence[Conditioned]
+    robot: Robot, of_fold: Callable[[int], CorrectedModel], unseen: Sequence[Span], recordings: Sequence[Conditioned]
 ) -> dict[str, Any] | None:
     """What motion.json holds.
 
     Args:
+        robot: The model as given.
         of_fold: The corrected model that has not seen a fold.
         unseen: What each fold leaves out.
         recordings: The conditioned recordings.
@@ -37,15 +40,20 @@ def proof_in_motion(
         return None
     step = float(np.mean([r.t[1] - r.t[0] for r in recordings]))
     parts = max(1, int(np.ceil(step / FINEST)))
-    models: dict[int, Simulated | None] = {w.fold: None for w in short}
-    for fold in models:
-        models[fold] = simulated(of_fold(fold), step / parts)
-    if any(m is None for m in models.values()):
+    nominal, ready = compiled_robot(robot, step / parts), {}
+    for fold in dict.fromkeys(w.fold for w in (*short, *runs)):
+        made = simulated(of_fold(fold), nominal, step / parts)
+        if made is None or nominal.nv != robot.n:
+            return None
+        ready[fold] = made
+    follow = np.any([m.weightless(r) for m in ready.values() for r in recordings], axis=0)
+    if follow.all():
         return None
-    ready = {fold: m for fold, m in models.items() if m}
-    robot = next(iter(ready.values())).model.robot
-    at = _errors(ready, recordings, short, parts, np.array(TIMES))
-    over = _errors(ready, recordings, runs, parts, np.linspace(0.0, LONGEST, 41)[1:]) if runs else {}
+    if follow.any():
+        ready = {fold: dataclasses.replace(m, compiled=led(m.compiled, follow)) for fold, m in ready.items()}
+    at = _errors(ready, follow, recordings, short, parts, np.array(TIMES))
+    over = _errors(ready, follow, recordings, runs, parts, np.linspace(0.0, LONGEST, 41)[1:]) if runs else {}
+    free, units = np.flatnonzero(~follow), ["m" if slide else "rad" for slide in robot.is_slide]
     lacking = list(dict.fromkeys(n.effect.title for m in ready.values() for n in m.model.named if n.effect.not_in_mjcf))
     out = {
         "schema": SCHEMA,
@@ -53,24 +61,27 @@ def proof_in_motion(
         "windows": len(short),
         "runs": len(runs),
         "tool": _by_model({name: 1e3 * x[..., -1] for name, x in at.items()}, "mm"),
-        "joints": {joint: _by_model({name: x[..., j] for name, x in at.items()}, "m" if robot.is_slide[j] else "rad")
-                   for j, joint in enumerate(robot.joint_names)},
-        "whole_run": _over_runs(over, robot.joint_names, robot.is_slide),
+        "joints": {
+            robot.joint_names[j]: _by_model({name: x[..., j] for name, x in at.items()}, units[j]) for j in free
+        },
+        "whole_run": _over_runs(over, {robot.joint_names[j]: (j, units[j]) for j in free}),
+        "followed": [robot.joint_names[j] for j in np.flatnonzero(follow)],
         "as_torque": lacking,
     }  # fmt: skip
     return out | {"sentences": sentences(out)}
 
 
 def _errors(
-    models: dict[int, Simulated], recordings: Sequence[Conditioned], cut: Sequence[Window], parts: int,
-    times: np.ndarray,
+    models: dict[int, Simulated], follow: np.ndarray, recordings: Sequence[Conditioned], cut: Sequence[Window],
+    parts: int, times: np.ndarray,
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """By model, and as "moved" for a robot that stays where it is: errors of all joints and, last, at the tool,
     shape (windows, times, n + 1) [rad, m]; NaN beyond the end of a window."""
     tool_of = models[cut[0].fold].compiled["nominal"]
     applied = {}
     for fold, recording in dict.fromkeys((w.fold, w.recording) for w in cut):
-        applied[fold, recording] = {m: models[fold].torque(m, recordings[recording]) for m in MODELS}
+        r = recordings[recording]
+        applied[fold, recording] = {m: leading(models[fold].torque(m, r), r, follow) for m in MODELS}
     batch = [(w, name) for name in MODELS for w in cut]
     longest = max(w.last - w.first for w in cut)
     n = recordings[0].q.shape[1]
@@ -122,13 +133,12 @@ def _quantile(x: np.ndarray, share: float) -> list[float | None]:
     return [v if np.isfinite(v) else None for v in values]
 
 
-def _over_runs(errors: dict[str, np.ndarray], joints: Sequence[str], slides: Sequence[bool]) -> dict[str, Any] | None:
-    """Median over all times of the whole runs."""
+def _over_runs(errors: dict[str, np.ndarray], joints: dict[str, tuple[int, str]]) -> dict[str, Any] | None:
+    """Median over all times of the whole runs; `joints` gives the number and the unit of each."""
     if not errors:
         return None
     joined = {name: np.moveaxis(x, -1, 0) for name, x in errors.items()}
     middle = {name: [_quantile(column.reshape(-1, 1), 0.5)[0] for column in x] for name, x in joined.items()}
     tool = {"unit": "mm"} | {name: None if m[-1] is None else 1e3 * m[-1] for name, m in middle.items()}
-    each = {joint: {"unit": "m" if slides[j] else "rad"} | {name: m[j] for name, m in middle.items()}
-            for j, joint in enumerate(joints)}  # fmt: skip
+    each = {joint: {"unit": unit} | {name: m[j] for name, m in middle.items()} for joint, (j, unit) in joints.items()}
     return {"seconds": LONGEST, "tool": tool, "joints": each}

@@ -60,7 +60,7 @@ def spans(folds: list[np.ndarray], recording: np.ndarray, times: list[np.ndarray
 
 
 def windows(unseen: list[Span], grids: list[np.ndarray], length: float = HORIZON, count: int = WINDOWS) -> list[Window]:
-    """Windows spread evenly over unseen spans, in proportion to their length; short spans get one shorter window.
+    """Windows spread evenly over unseen spans, in proportion to their length; in short spans the later are shorter.
 
     Args:
         unseen: The spans.
@@ -75,8 +75,8 @@ def windows(unseen: list[Span], grids: list[np.ndarray], length: float = HORIZON
         begin, end = max(span.begin, t[0] + MARGIN), min(span.end, t[-1] - MARGIN)
         if end - begin < 0.1 * length:
             continue
-        many = max(1, round(count * (span.end - span.begin) / whole)) if end - begin > length else 1
-        for start in np.linspace(begin, max(begin, end - length), many):
+        many = max(1, round(count * (span.end - span.begin) / whole))
+        for start in np.linspace(begin, max(end - length, 0.5 * (begin + end)), many) if many > 1 else [begin]:
             first = int(np.searchsorted(t, start))
             last = int(np.searchsorted(t, min(start + length, end) + 1e-9)) - 1
             if last > first:
