@@ -14,6 +14,8 @@ import pathlib
 import tempfile
 from collections.abc import Callable
 
+import numpy as np
+
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.mismatch import diagnose
 from irb140_jax.recordings import read_recording
@@ -74,20 +76,25 @@ def judged(files: Files) -> dict:
             refit, corrected, moved = (row[name]["median"][k] for name in ("refit", "corrected", "moved"))
             if moved is None:
                 continue
-            known = [x for x in (refit, corrected) if x is not None]
-            lost = not known or min(known) > moved
-            ratio = corrected / refit if refit and corrected is not None else None
             rows.append({"time": time, "joint": joint, "named": joint in named, "nominal": row["nominal"]["median"][k],
-                         "refit": refit, "corrected": corrected, "moved": moved, "lost": lost,
-                         "ratio": ratio})  # fmt: skip
-    counted = [row for row in rows if not row["lost"] and row["ratio"] is not None]
-    return told | {
-        "windows": motion["windows"], "as_torque": motion["as_torque"], "tool": motion["tool"],
-        "whole_run": motion["whole_run"], "rows": rows, "sentences": motion["sentences"],
-        "counted": len(counted), "lost": len(rows) - len(counted),
-        "worse": [row for row in counted if row["ratio"] > WORSE],
-        "not_halved": [row for row in counted if row["named"] and row["ratio"] > HALVED],
-    }  # fmt: skip
+                         "refit": refit, "corrected": corrected, "moved": moved})  # fmt: skip
+    kept = ("windows", "runs", "as_torque", "followed", "tool", "whole_run", "sentences")
+    return told | {key: motion[key] for key in kept} | {"rows": rows}
+
+
+def scored(told: dict) -> dict:
+    """With what it says of the goals; an error that is None is without end."""
+    if "rows" not in told:
+        return told
+    for row in told["rows"]:
+        refit, corrected = (np.inf if row[name] is None else row[name] for name in ("refit", "corrected"))
+        row["lost"] = bool(min(refit, corrected) > row["moved"])
+        row["ratio"] = None if row["lost"] else round(corrected / refit, 4) if np.isfinite(corrected) else None
+        row["worse"] = not row["lost"] and bool(corrected > WORSE * refit)
+        row["not_halved"] = not row["lost"] and row["named"] and bool(corrected > HALVED * refit)
+    counts = {key: sum(row[key] for row in told["rows"]) for key in ("lost", "worse", "not_halved")}
+    named = sum(row["named"] and not row["lost"] for row in told["rows"])
+    return told | {"counted": len(told["rows"]) - counts["lost"], "counted_named": named} | counts
 
 
 def main() -> None:
@@ -105,13 +112,18 @@ def main() -> None:
                 results[name] = judged(write(pathlib.Path(folder)))
             except Exception as error:  # one machine's trouble is not another's
                 results[name] = {"error": f"{type(error).__name__}: {error}"}
-        told = results[name]
-        counts = {key: told.get(key) for key in ("counted", "lost")}
-        missed = {key: len(told.get(key, [])) for key in ("worse", "not_halved")}
-        print(name, told.get("verdict"), told.get("error", ""), counts | missed, flush=True)
-        fresh = asked.out.with_suffix(".new")
-        fresh.write_text(json.dumps(results, indent=1) + "\n")
-        os.replace(fresh, asked.out)
+        _write(results, asked.out)
+    _write(results, asked.out)
+    for name, told in results.items():
+        counts = {key: told.get(key) for key in ("counted", "lost", "worse", "counted_named", "not_halved")}
+        print(name, told.get("verdict"), told.get("error", ""), counts)
+
+
+def _write(results: dict, out: pathlib.Path) -> None:
+    results |= {name: scored(told) for name, told in results.items()}
+    fresh = out.with_suffix(".new")
+    fresh.write_text(json.dumps(results, indent=1) + "\n")
+    os.replace(fresh, out)
 
 
 if __name__ == "__main__":
