@@ -78,7 +78,7 @@ def judged(files: Files) -> dict:
                 continue
             rows.append({"time": time, "joint": joint, "named": joint in named, "nominal": row["nominal"]["median"][k],
                          "refit": refit, "corrected": corrected, "moved": moved})  # fmt: skip
-    kept = ("windows", "runs", "as_torque", "followed", "tool", "whole_run", "sentences")
+    kept = ("windows", "runs", "as_torque", "followed", "tool", "whole_run")
     return told | {key: motion[key] for key in kept} | {"rows": rows}
 
 

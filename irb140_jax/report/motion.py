@@ -20,18 +20,20 @@ def motion_section(proof: Mapping) -> dict:
     rows = [("tool", proof["tool"]), *proof["joints"].items()]
     return {
         "times": SHOWN_AT,
-        "tool": _figure(proof, proof["tool"], "tool", "off at the tool [mm]"),
+        "shown": proof["shown"],
+        "figure": _figure(proof, proof["joints"].get(proof["shown"], proof["tool"]), proof["shown"]),
         "rows": [{"name": name, "unit": row["unit"], "cells": [_cells(row, k) for k in at]} for name, row in rows],
         "sentences": proof["sentences"],
         "windows": proof["windows"],
     }
 
 
-def _figure(proof: Mapping, row: Mapping, what: str, label: str) -> Markup:
+def _figure(proof: Mapping, row: Mapping, what: str) -> Markup:
     """Median errors over the horizon; the thick line is how far the recorded motion went."""
     lines = [svg.Series("measured", row["moved"]["median"])]
     lines += [svg.Series(name, row[name]["median"]) for name in MODELS]
     name = f"How far each model's {what} is from the recorded one, over the time since the start"
+    label = f"{what} off by [{row['unit']}]"
     drawn = svg.line_plot(proof["horizon"], lines, "time since the start [s]", label, (540, 250), log_y=True, name=name)
     return Markup(drawn)
 

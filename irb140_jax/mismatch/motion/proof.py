@@ -8,7 +8,7 @@ import numpy as np
 
 from irb140_jax.mismatch.model import CorrectedModel
 from irb140_jax.mismatch.motion.models import MODELS, Simulated, compiled_robot, leading, led, simulated
-from irb140_jax.mismatch.motion.told import sentences
+from irb140_jax.mismatch.motion.told import sentences, subject
 from irb140_jax.mismatch.motion.windows import FINEST, LONGEST, Span, Window, windows
 from irb140_jax.oracle.rollout import positions, tool_positions
 from irb140_jax.recordings.condition import Conditioned
@@ -53,7 +53,7 @@ def proof_in_motion(
         ready = {fold: dataclasses.replace(m, compiled=led(m.compiled, follow)) for fold, m in ready.items()}
     at = _errors(ready, follow, recordings, short, parts, np.array(TIMES))
     over = _errors(ready, follow, recordings, runs, parts, np.linspace(0.0, LONGEST, 41)[1:]) if runs else {}
-    free, units = np.flatnonzero(~follow), ["m" if slide else "rad" for slide in robot.is_slide]
+    free, units = np.flatnonzero(~follow).tolist(), ["m" if slide else "rad" for slide in robot.is_slide]
     lacking = list(dict.fromkeys(n.effect.title for m in ready.values() for n in m.model.named if n.effect.not_in_mjcf))
     out = {
         "schema": SCHEMA,
@@ -68,7 +68,7 @@ def proof_in_motion(
         "followed": [robot.joint_names[j] for j in np.flatnonzero(follow)],
         "as_torque": lacking,
     }  # fmt: skip
-    return out | {"sentences": sentences(out)}
+    return out | {"shown": subject(out)[0].removeprefix("the "), "sentences": sentences(out)}
 
 
 def _errors(

@@ -5,24 +5,26 @@ from typing import Any
 
 MODELS = ("nominal", "refit", "corrected")
 SAID_AT = (0.1, 0.5, 2.0)  # [s]
+LEAST = 1e-3  # [mm] a tool that moves less is on the axis
 
 
 def sentences(proof: Mapping[str, Any]) -> list[str]:
     """How far off the models are, until when the comparison means anything, and what was applied as torque."""
-    tool, horizon = proof["tool"], proof["horizon"]
-    middle = {name: tool[name]["median"] for name in ("nominal", "refit", "corrected", "moved")}
+    horizon, (what, row) = proof["horizon"], subject(proof)
+    middle = {name: row[name]["median"] for name in (*MODELS, "moved")}
     said = []
     for time in SAID_AT:
         k = horizon.index(time)
         if middle["moved"][k] is not None:
-            given = _listed({name: middle[name][k] for name in MODELS})
-            said.append(f"After {time:g} s the tool is off by {given}; the robot has moved it by "
-                        f"{_mm(middle['moved'][k])} (medians of {proof['windows']} starts).")  # fmt: skip
+            given = _listed({name: middle[name][k] for name in MODELS}, row["unit"])
+            moved = _with_unit(middle["moved"][k], row["unit"])
+            said.append(f"After {time:g} s {what} is off by {given}; the robot has moved it by {moved} (medians of "
+                        f"{proof['windows']} starts).")  # fmt: skip
     if (last := lost(proof)) is not None:
-        said.append(f"From {last:g} s on every model is farther off than the tool has moved: driven by torque alone, "
+        said.append(f"From {last:g} s on every model is farther off than {what} has moved: driven by torque alone, "
                     "without a controller, small errors grow, and there the comparison means nothing.")  # fmt: skip
-    if (run := proof["whole_run"]) is not None and run["tool"]["corrected"] is not None:
-        errors = _listed(run["tool"])
+    if (run := proof["whole_run"]) is not None:
+        errors = _listed(run["tool"] if row is proof["tool"] else run["joints"][what], row["unit"])
         said.append(f"Over whole recordings, {run['seconds']:g} s at most, it is off by {errors} (medians over time).")
     if proof["followed"]:
         said.append(f"{', '.join(proof['followed'])}: without any inertia in one of the models, so that torque alone "
@@ -33,13 +35,21 @@ def sentences(proof: Mapping[str, Any]) -> list[str]:
     return said
 
 
+def subject(proof: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]]:
+    """What is talked of: the tool, or where the joints don't move that, the joint that moves most."""
+    far = lambda row: max((x for x in row["moved"]["median"] if x is not None), default=0.0)  # noqa: E731
+    if far(proof["tool"]) > LEAST:
+        return "the tool", proof["tool"]
+    joint = max(proof["joints"], key=lambda name: far(proof["joints"][name]))
+    return joint, proof["joints"][joint]
+
+
 def lost(proof: Mapping[str, Any]) -> float | None:
-    """Time from which every model's error exceeds what the tool moves [s]; None if that does not happen."""
-    tool, out = proof["tool"], None
+    """Time from which every model's error exceeds what the robot moves [s]; None if that does not happen."""
+    (_, row), out = subject(proof), None
     for k in reversed(range(len(proof["horizon"]))):
-        moved = tool["moved"]["median"][k]
-        best = min((x for name in ("nominal", "refit", "corrected") if (x := tool[name]["median"][k]) is not None),
-                   default=float("inf"))  # fmt: skip
+        moved = row["moved"]["median"][k]
+        best = min((x for name in MODELS if (x := row[name]["median"][k]) is not None), default=float("inf"))
         if moved is None:
             continue
         if best <= moved:
@@ -48,10 +58,10 @@ def lost(proof: Mapping[str, Any]) -> float | None:
     return out
 
 
-def _listed(errors: Mapping[str, float | None]) -> str:
-    each = [f"{_mm(errors[name])} ({name})" for name in MODELS]
+def _listed(errors: Mapping[str, float | None], unit: str) -> str:
+    each = [f"{_with_unit(errors[name], unit)} ({name})" for name in MODELS]
     return f"{', '.join(each[:-1])} and {each[-1]}"
 
 
-def _mm(x: float | None) -> str:
-    return "far too much to tell" if x is None else f"{x:.3g} mm"
+def _with_unit(x: float | None, unit: str) -> str:
+    return "more than can be told" if x is None else f"{x:.3g} {unit}"

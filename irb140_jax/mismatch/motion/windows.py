@@ -52,9 +52,9 @@ def spans(folds: list[np.ndarray], recording: np.ndarray, times: list[np.ndarray
             run: list[float] | None = None
             for b, left_out in enumerate([*mine, False]):
                 if left_out:
-                    run = [run[0] if run else t[edges[b]], t[edges[b + 1]]]
+                    run = [run[0] if run else float(t[edges[b]]), float(t[edges[b + 1]])]
                 elif run:
-                    out.append(Span(r, f, float(run[0]), float(run[1])))
+                    out.append(Span(r, f, run[0], run[1]))
                     run = None
     return out
 
