@@ -77,7 +77,8 @@ def judged(files: Files) -> dict:
             if moved is None:
                 continue
             rows.append({"time": time, "joint": joint, "named": joint in named, "nominal": row["nominal"]["median"][k],
-                         "refit": refit, "corrected": corrected, "moved": moved})  # fmt: skip
+                         "refit": refit, "corrected": corrected, "moved": moved,
+                         "file": row["file"]["median"][k] if "file" in row else corrected})  # fmt: skip
     kept = ("windows", "runs", "as_torque", "followed", "tool", "whole_run")
     return told | {key: motion[key] for key in kept} | {"rows": rows}
 

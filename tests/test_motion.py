@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 import irb140_jax.mismatch.store as store
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.model import CorrectedModel, Named
-from irb140_jax.mismatch.motion import proof_in_motion
+from irb140_jax.mismatch.motion import not_in_file, proof_in_motion
 from irb140_jax.mismatch.motion.told import lost, sentences
 from irb140_jax.mismatch.motion.windows import Span, spans, windows
 from irb140_jax.oracle.rollout import positions, simulated_model
@@ -66,7 +66,7 @@ def proof(*effects: Named, **options) -> dict:
     robot = robot_of(ARM)
     recording = recorded(**options)
     unseen = [Span(0, 0, 0.0, float(recording.t[-1]))]
-    made = proof_in_motion(robot, lambda _: model_of(robot, *effects), unseen, [recording])
+    made = proof_in_motion(robot, lambda _: model_of(robot, *effects), unseen, [recording], [0.0 * recording.tau])
     assert made is not None
     return made
 
@@ -122,13 +122,15 @@ def test_a_torque_constant_in_the_gear_is_undone_in_the_simulation():
 def test_what_mjcf_cannot_hold_is_applied_as_torque_and_said():
     both = named("asymmetric_friction", 0, 1.0, 3.0)
     robot, recording = robot_of(ARM), recorded(viscous=0.0)
-    tau = recording.tau + np.stack([np.where(recording.qd[:, 0] > 0, 1.0, -3.0), 0.0 * recording.t], axis=1)
-    recording = dataclasses.replace(recording, tau=tau)
-    made = proof_in_motion(robot, lambda _: model_of(robot, both), [Span(0, 0, 0.0, 5.99)], [recording])
+    law = recording.tau + np.stack([np.where(recording.qd[:, 0] > 0, 1.0, -3.0), 0.3 * np.sin(recording.t)], axis=1)
+    model, recording = model_of(robot, both), dataclasses.replace(recording, tau=law)
+    missing = not_in_file(model, recording, law)  # the sine, which the file does not hold
+    made = proof_in_motion(robot, lambda _: model, [Span(0, 0, 0.0, 5.99)], [recording], [missing])
     assert made and made["as_torque"] == ["friction that differs by direction"]
     assert "applied as a torque" in made["sentences"][-1]
-    joint = made["joints"]["a"]
-    assert joint["corrected"]["median"][5] < 0.1 * joint["refit"]["median"][5]
+    for joint in made["joints"].values():
+        assert joint["corrected"]["median"][5] < 0.1 * joint["refit"]["median"][5]
+    assert made["joints"]["b"]["file"]["median"][5] > 5 * made["joints"]["b"]["corrected"]["median"][5]
 
 
 def test_a_joint_without_inertia_follows_the_recording_and_the_others_are_judged():
@@ -136,7 +138,8 @@ def test_a_joint_without_inertia_follows_the_recording_and_the_others_are_judged
     bare = with_phi(robot, robot.phi.at[1].set(1e-9 * robot.phi[1]))
     recording = recorded()
     effect = named("viscous_friction", 0, VISCOUS)
-    made = proof_in_motion(bare, lambda _: model_of(bare, effect), [Span(0, 0, 0.0, 5.99)], [recording])
+    missing = [0.0 * recording.tau]
+    made = proof_in_motion(bare, lambda _: model_of(bare, effect), [Span(0, 0, 0.0, 5.99)], [recording], missing)
     assert made and made["followed"] == ["b"] and list(made["joints"]) == ["a"]
     assert any("follows the recording" in sentence for sentence in made["sentences"])
 

@@ -27,7 +27,7 @@ from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, fitted
 from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding, torque_scale_odds
 from irb140_jax.mismatch.model import CorrectedModel, Named, scaled, torques_along
-from irb140_jax.mismatch.motion import proof_in_motion
+from irb140_jax.mismatch.motion import not_in_file, proof_in_motion
 from irb140_jax.mismatch.motion.windows import spans
 from irb140_jax.mismatch.native import native_gap
 from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, notes, skew_notes
@@ -141,7 +141,8 @@ def _diagnosed(
     model = _model(robot, ex, refit, proof, band, config.known_joints or robot.joint_names)
     logged = [s.tau for s in ex.data.stretches]
     laws = dataclasses.replace(model, discrepancy=None)  # which the file can't hold, as a note of its own says
-    corrected = [band.apply(torques_along(laws, r).corrected) for r in smooth]
+    by_laws = [torques_along(laws, r).corrected for r in smooth]
+    corrected = [band.apply(torque) for torque in by_laws]
     lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
     gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)
@@ -157,13 +158,14 @@ def _diagnosed(
     diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
-    motion = _motion(robot, ex, proof, refit.loose, band, smooth, recordings)
+    missing = [not_in_file(model, r, torque) for r, torque in zip(smooth, by_laws, strict=True)]
+    motion = _motion(robot, ex, proof, refit.loose, band, smooth, recordings, missing)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said) | {"motion": motion}, open_)
 
 
 def _motion(
     robot: Robot, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], band: Band, smooth: Sequence[Conditioned],
-    recordings: Sequence[Recording],
+    recordings: Sequence[Recording], missing: Sequence[np.ndarray],
 ) -> dict[str, Any] | None:  # fmt: skip
     """The proof in motion; None where a joint's torque was lost, so that nothing can be simulated."""
     if any(r.torque_lost is not None and r.torque_lost.any() for r in recordings):
@@ -174,7 +176,7 @@ def _motion(
         fold = proof.folds[k]
         return _fitted_model(robot, ex, fold.refit, loose, fold.corrected, fold.scale, band)
 
-    return rounded(proof_in_motion(robot, of_fold, unseen, smooth))
+    return rounded(proof_in_motion(robot, of_fold, unseen, smooth, missing))
 
 
 def _nothing_compared(

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from irb140_jax.mismatch.consistent import consistent, is_body
-from irb140_jax.mismatch.model import CorrectedModel, torques_along
+from irb140_jax.mismatch.model import CorrectedModel
 from irb140_jax.mismatch.native import native_robot
 from irb140_jax.oracle.mujoco import inverse_dynamics, mass_matrix, oracle_model
 from irb140_jax.oracle.rollout import simulated_model
@@ -19,6 +19,7 @@ from irb140_jax.robot import Robot, robot_mjcf, with_phi
 ENDLESS = 1e5  # [rad/s^2 or m/s^2] faster, no motor turns anything
 FLYWHEEL = 1e6  # [kg m^2 or kg] rotor of a joint that follows the recording
 MODELS = ("nominal", "refit", "corrected")
+FILE = "file"  # corrected.xml alone, where it can't hold all effects
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,22 +43,35 @@ class Simulated:
         lightest = np.min([np.diagonal(mass_matrix(m, recording.q[0])) for m in self.compiled.values()], axis=0)
         return most > ENDLESS * lightest
 
-    def torque(self, name: str, recording: Conditioned) -> np.ndarray:
-        """Torque on the joints of a model along a recording, (T, n) [N m or N]: what was logged and, for the corrected
-        model, what the effects that MJCF can't hold take or give along the recorded motion."""
-        if name != "corrected":
-            return recording.tau
-        return (recording.tau - self.missing(recording)) * self.gear
+    def torque(self, name: str, tau: np.ndarray, missing: np.ndarray) -> np.ndarray:
+        """Torque on the joints of a model, (T, n) [N m or N].
 
-    def missing(self, recording: Conditioned) -> np.ndarray:
-        """What the log would hold beyond corrected.xml by the named laws, (T, n) [N m or N]."""
-        if not any(named.effect.not_in_mjcf for named in self.model.named):
-            return np.zeros_like(recording.tau)
-        laws = dataclasses.replace(self.model, discrepancy=None)
-        native = oracle_model(self.compiled["corrected"])
-        moving = zip(recording.q, recording.qd, recording.qdd, strict=True)
-        own = np.array([inverse_dynamics(native, *x) for x in moving]) + native.dof_frictionloss * recording.direction
-        return torques_along(laws, recording).corrected - own / self.gear
+        Args:
+            name: Of the model.
+            tau: What was logged, (T, n) [N m or N].
+            missing: What of it corrected.xml can't hold (see `not_in_file`), (T, n) [N m or N].
+        """
+        if name in ("nominal", "refit"):
+            return tau
+        return (tau if name == FILE else tau - missing) * self.gear
+
+
+def not_in_file(model: CorrectedModel, recording: Conditioned, corrected: np.ndarray) -> np.ndarray:
+    """What the named laws add along a recorded motion to the torque of corrected.xml, (T, n) [N m or N].
+
+    Args:
+        model: The corrected model.
+        recording: The motion.
+        corrected: Torque of the laws along it, (T, n) [N m or N].
+    """
+    if not any(named.effect.not_in_mjcf for named in model.named):
+        return np.zeros_like(corrected)
+    robot = native_robot(model)
+    native = oracle_model(robot_mjcf(robot))
+    gear = np.asarray(robot.gear) / np.asarray(model.robot.gear)
+    moving = zip(recording.q, recording.qd, recording.qdd, strict=True)
+    own = np.array([inverse_dynamics(native, *x) for x in moving]) + native.dof_frictionloss * recording.direction
+    return corrected - own / gear
 
 
 def simulated(model: CorrectedModel, nominal: mujoco.MjModel, step: float) -> Simulated | None:
@@ -73,6 +87,7 @@ def simulated(model: CorrectedModel, nominal: mujoco.MjModel, step: float) -> Si
     compiled = {name: compiled_robot(robot, step) for name, robot in robots.items()}
     if any(m.nv != model.robot.n for m in compiled.values()):
         return None
+    compiled[FILE] = compiled["corrected"]
     return Simulated(model, {"nominal": nominal} | compiled, np.asarray(corrected.gear) / np.asarray(model.robot.gear))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.mismatch.model import CorrectedModel
-from irb140_jax.mismatch.motion.models import MODELS, Simulated, compiled_robot, leading, led, simulated
+from irb140_jax.mismatch.motion.models import FILE, MODELS, Simulated, compiled_robot, leading, led, simulated
 from irb140_jax.mismatch.motion.told import sentences, subject
 from irb140_jax.mismatch.motion.windows import FINEST, LONGEST, Span, Window, windows
 from irb140_jax.oracle.rollout import positions, tool_positions
@@ -19,8 +19,9 @@ TIMES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)  # [s] of the hori
 
 
 def proof_in_motion(
-    robot: Robot, of_fold: Callable[[int], CorrectedModel], unseen: Sequence[Span], recordings: Sequence[Conditioned]
-) -> dict[str, Any] | None:
+    robot: Robot, of_fold: Callable[[int], CorrectedModel], unseen: Sequence[Span], recordings: Sequence[Conditioned],
+    missing: Sequence[np.ndarray],
+) -> dict[str, Any] | None:  # fmt: skip
     """What motion.json holds.
 
     Args:
@@ -28,6 +29,7 @@ def proof_in_motion(
         of_fold: The corrected model that has not seen a fold.
         unseen: What each fold leaves out.
         recordings: The conditioned recordings.
+        missing: What corrected.xml can't hold along each, from `not_in_file` [N m or N].
 
     Returns:
         Errors of each model by joint and at the tool; None where nothing can be simulated.
@@ -51,10 +53,14 @@ def proof_in_motion(
         return None
     if follow.any():
         ready = {fold: dataclasses.replace(m, compiled=led(m.compiled, follow)) for fold, m in ready.items()}
-    at = _errors(ready, follow, recordings, short, parts, np.array(TIMES))
-    over = _errors(ready, follow, recordings, runs, parts, np.linspace(0.0, LONGEST, 41)[1:]) if runs else {}
-    free, units = np.flatnonzero(~follow).tolist(), ["m" if slide else "rad" for slide in robot.is_slide]
     lacking = list(dict.fromkeys(n.effect.title for m in ready.values() for n in m.model.named if n.effect.not_in_mjcf))
+    names = (*MODELS, FILE) if lacking else MODELS
+    applied = lambda name, w: leading(  # noqa: E731
+        ready[w.fold].torque(name, recordings[w.recording].tau, missing[w.recording]), recordings[w.recording], follow
+    )
+    at = _errors(ready, names, applied, recordings, short, parts, np.array(TIMES))
+    over = _errors(ready, names, applied, recordings, runs, parts, np.linspace(0.0, LONGEST, 41)[1:]) if runs else {}
+    free, units = np.flatnonzero(~follow).tolist(), ["m" if slide else "rad" for slide in robot.is_slide]
     out = {
         "schema": SCHEMA,
         "horizon": list(TIMES),
@@ -72,22 +78,18 @@ def proof_in_motion(
 
 
 def _errors(
-    models: dict[int, Simulated], follow: np.ndarray, recordings: Sequence[Conditioned], cut: Sequence[Window],
-    parts: int, times: np.ndarray,
+    models: dict[int, Simulated], names: Sequence[str], applied: Callable[[str, Window], np.ndarray],
+    recordings: Sequence[Conditioned], cut: Sequence[Window], parts: int, times: np.ndarray,
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """By model, and as "moved" for a robot that stays where it is: errors of all joints and, last, at the tool,
     shape (windows, times, n + 1) [rad, m]; NaN beyond the end of a window."""
     tool_of = models[cut[0].fold].compiled["nominal"]
-    applied = {}
-    for fold, recording in dict.fromkeys((w.fold, w.recording) for w in cut):
-        r = recordings[recording]
-        applied[fold, recording] = {m: leading(models[fold].torque(m, r), r, follow) for m in MODELS}
-    batch = [(w, name) for name in MODELS for w in cut]
+    batch = [(w, name) for name in names for w in cut]
     longest = max(w.last - w.first for w in cut)
     n = recordings[0].q.shape[1]
     tau, start, speed = np.zeros((len(batch), longest * parts, n)), np.zeros((len(batch), n)), np.zeros((len(batch), n))
     for b, (w, name) in enumerate(batch):
-        r, torque = recordings[w.recording], applied[w.fold, w.recording][name]
+        r, torque = recordings[w.recording], applied(name, w)
         fine = w.first + np.arange((w.last - w.first) * parts) / parts
         low = np.minimum(fine.astype(int), len(torque) - 2)
         tau[b, : len(fine)] = torque[low] + (fine - low)[:, None] * (torque[low + 1] - torque[low])
@@ -96,8 +98,8 @@ def _errors(
     went = positions([models[w.fold].compiled[name] for w, name in batch], start, speed, tau)[:, ::parts]
     true, still, simulated_ = (np.full((len(cut), len(times), n), np.nan) for _ in range(3))
     out = {}
-    for name in MODELS:
-        own = went[MODELS.index(name) * len(cut) :]
+    for first, name in enumerate(names):
+        own = went[first * len(cut) :]
         for k, w in enumerate(cut):
             r = recordings[w.recording]
             rows = np.round(times / (r.t[1] - r.t[0])).astype(int)

@@ -30,8 +30,11 @@ def sentences(proof: Mapping[str, Any]) -> list[str]:
         said.append(f"{', '.join(proof['followed'])}: without any inertia in one of the models, so that torque alone "
                     "can't drive it; in all models it follows the recording.")  # fmt: skip
     if proof["as_torque"]:
+        alone = [f"{_with_unit(row['file']['median'][horizon.index(time)], row['unit'])} after {time:g} s"
+                 for time in SAID_AT if middle["moved"][horizon.index(time)] is not None]  # fmt: skip
         said.append(f"corrected.xml can't hold {', '.join(proof['as_torque'])} in whole or in part; what it lacks was "
-                    "applied as a torque computed along the recorded motion.")  # fmt: skip
+                    "applied as a torque computed along the recorded motion, which favours the corrected model. With "
+                    f"the file alone {what} is off by {', '.join(alone)}.")  # fmt: skip
     return said
 
 
