@@ -24,8 +24,10 @@ def sentences(proof: Mapping[str, Any]) -> list[str]:
         said.append(f"From {last:g} s on every model is farther off than {what} has moved: driven by torque alone, "
                     "without a controller, small errors grow, and there the comparison means nothing.")  # fmt: skip
     if (run := proof["whole_run"]) is not None:
-        errors = _listed(run["tool"] if row is proof["tool"] else run["joints"][what], row["unit"])
-        said.append(f"Over whole recordings, {run['seconds']:g} s at most, it is off by {errors} (medians over time).")
+        whole = run["tool"] if row is proof["tool"] else run["joints"][what]
+        errors, moved = _listed(whole, row["unit"]), _with_unit(whole["moved"], row["unit"])
+        said.append(f"Over whole recordings, {run['seconds']:g} s at most, it is off by {errors}; the robot was {moved} "
+                    "from its start (medians over time).")  # fmt: skip
     if proof["followed"]:
         said.append(f"{', '.join(proof['followed'])}: without any inertia in one of the models, so that torque alone "
                     "can't drive it; in all models it follows the recording.")  # fmt: skip
