@@ -26,7 +26,7 @@ def sentences(proof: Mapping[str, Any]) -> list[str]:
     if (run := proof["whole_run"]) is not None:
         whole = run["tool"] if row is proof["tool"] else run["joints"][what]
         errors, moved = _listed(whole, row["unit"]), _with_unit(whole["moved"], row["unit"])
-        said.append(f"Over whole recordings, {run['seconds']:g} s at most, it is off by {errors}; the robot was {moved} "
+        said.append(f"Over whole recordings ({run['seconds']:g} s at most) it is off by {errors}; the robot is {moved} "
                     "from its start (medians over time).")  # fmt: skip
     if proof["followed"]:
         said.append(f"{', '.join(proof['followed'])}: without any inertia in one of the models, so that torque alone "
