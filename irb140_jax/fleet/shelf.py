@@ -1,9 +1,9 @@
 """Where many diagnoses lie, so that a run which is killed at any moment can be gone on with.
 
-    OUT/diagnoses/<unit>/   a whole diagnosis, moved there in one step
-    OUT/rows/<unit>.json    its row, written after that
-    OUT/table.parquet, OUT/index.html    all rows
-    OUT/.irb140-*           what a run needs meanwhile; what a killed run left of it is removed by the next one
+OUT/diagnoses/<unit>/   a whole diagnosis, moved there in one step
+OUT/rows/<unit>.json    its row, written after that
+OUT/table.parquet, OUT/index.html    all rows
+OUT/.irb140-*           what a run needs meanwhile; what a killed run left of it is removed by the next one
 """
 
 import contextlib

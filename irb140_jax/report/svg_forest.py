@@ -82,5 +82,3 @@ def _diamond(box: svg.Box, pooled: Mapping, y: float) -> str:
 def _cut(name: str) -> str:
     """A name as long as there is room for; the ends of long names tell them apart best."""
     return html.escape(name if len(name) <= 24 else f"…{name[-23:]}")
-
-
