@@ -21,12 +21,13 @@ from helpers_cli import MODEL, recording, refused, stub, table  # noqa: F401
 import irb140_jax.mismatch
 import irb140_jax.recordings
 from irb140_jax import cli
+from irb140_jax.cli.commands import word
 from irb140_jax.cli.diagnose import STEPS
 from irb140_jax.cli.parsing import parsed
 from irb140_jax.cli.shown import Share
 from irb140_jax.errors import InputError
 
-COMMANDS = ("diagnose", "predict", "demo", "excite", "inspect")
+COMMANDS = ("diagnose", "predict", "demo", "excite", "inspect", "diagnose-many", "compare")
 
 
 def irb140(*words, cwd=None) -> subprocess.CompletedProcess:
@@ -328,7 +329,7 @@ def test_the_help_of_a_command_ends_with_lines_that_work(command, capsys):
     assert len(lines) >= 2
     for line in lines:
         words = shlex.split(re.split(r"\s{3,}| > ", line.strip())[0])
-        assert words[0] == "irb140" and type(parsed(words[1:])).__name__.lower() == words[1]
+        assert words[0] == "irb140" and word(type(parsed(words[1:]))) == words[1]
 
 
 def test_the_version_is_told(capsys):

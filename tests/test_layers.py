@@ -22,6 +22,7 @@ LAYERS = (
     ("recordings",),
     ("mismatch",),
     ("report",),
+    ("fleet",),
     ("cli", "library"),
     ("__main__",),
 )

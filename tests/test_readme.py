@@ -7,6 +7,7 @@ import tomllib
 
 import pytest
 
+from irb140_jax.cli.commands import word
 from irb140_jax.cli.parsing import parsed
 
 ROOT = pathlib.Path(__file__).parents[1]
@@ -45,7 +46,7 @@ def test_a_ci_with_another_test_command_would_be_noticed():
 def test_every_irb140_command_of_the_readme_is_understood(line):
     words = shlex.split(line.split("irb140 ", 1)[1], comments=True)
     command = parsed(words)
-    assert type(command).__name__.lower() == words[0]
+    assert word(type(command)) == words[0]
 
 
 def test_every_link_of_the_readme_and_of_the_docs_leads_somewhere():

@@ -69,21 +69,26 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
     def run(self) -> None:
         if not self.recordings:
             raise InputError("diagnose: no recording was named; give at least one: irb140 diagnose REC --out DIR")
-        if not 0.0 < self.inertial_uncertainty <= 1.0:  # so that what is no number is refused, too
-            raise InputError(
-                f"--inertial-uncertainty {self.inertial_uncertainty:g}: allowed is a share above 0 and up to 1, say "
-                "0.05 for 5 %"
-            )
+        self.check_uncertainty(self.inertial_uncertainty)
         from irb140_jax.report import results_folder
 
         inputs = [path for path in (*self.recordings, self.robot, self.columns) if path]
         with results_folder(self.out, "irb140 diagnose", inputs) as results:
-            result = self._diagnosed()
-            folder = results.write(lambda folder: _write(result, folder, self.out))
+            result = self.diagnosed()
+            folder = results.write(lambda folder: self.write(result, folder, self.out))
             tell_kept(results)
             show(result, self.out if folder == results.folder else folder, json=self.json)
 
-    def _diagnosed(self) -> "Result":
+    @staticmethod
+    def check_uncertainty(share: float) -> None:
+        """Refuse what is no share, or no number."""
+        if not 0.0 < share <= 1.0:
+            raise InputError(
+                f"--inertial-uncertainty {share:g}: allowed is a share above 0 and up to 1, say 0.05 for 5 %"
+            )
+
+    def diagnosed(self) -> "Result":
+        """The diagnosis of the recordings."""
         from irb140_jax.recordings import read_recording
         from irb140_jax.robot import irb140_path, movable_joints
 
@@ -92,6 +97,15 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
         known = movable_joints(self.robot or irb140_path())
         recordings = [read_recording(path, robot, self.columns, known_joints=known) for path in self.recordings]
         return diagnosed(robot, recordings, self.inertial_uncertainty, self._words(), known)
+
+    @staticmethod
+    def write(result: "Result", folder: pathlib.Path, out: pathlib.Path) -> None:
+        """Diagnosis, model and report into an empty folder, which will be `out`."""
+        from irb140_jax.mismatch import save
+        from irb140_jax.report import html_report
+
+        save(result, folder)
+        (folder / "report.html").write_text(html_report(result.diagnosis, result.views, folder=out), encoding="utf-8")
 
     def _words(self) -> tuple[str, ...]:
         """Options that name files or joints, as the diagnosis keeps them."""
@@ -111,15 +125,6 @@ def diagnosed(
     with progress(STEPS) as tell:
         config = DiagnoseConfig(inertial_uncertainty=inertial_uncertainty, words=words, known_joints=known_joints)
         return diagnose(robot, recordings, config, tell)
-
-
-def _write(result: "Result", folder: pathlib.Path, out: pathlib.Path) -> None:
-    """Diagnosis, model and report into an empty folder, which will be `out`."""
-    from irb140_jax.mismatch import save
-    from irb140_jax.report import html_report
-
-    save(result, folder)
-    (folder / "report.html").write_text(html_report(result.diagnosis, result.views, folder=out), encoding="utf-8")
 
 
 def show(result: "Result", out: pathlib.Path, *, json: bool = False) -> None:

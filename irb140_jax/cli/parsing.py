@@ -10,7 +10,7 @@ from typing import Any
 
 import tyro
 
-from irb140_jax.cli.commands import COMMANDS, Command
+from irb140_jax.cli.commands import COMMANDS, Command, word
 from irb140_jax.errors import InputError
 
 FIRST_STEPS = """\
@@ -50,6 +50,6 @@ def parsed(argv: Sequence[str] | None) -> Any:
 
 def _examples(words: Sequence[str]) -> str:
     """What to end a help with: lines that can be copied."""
-    asked = [command for command in COMMANDS if command.__name__.lower() in words[:1]]
+    asked = [command for command in COMMANDS if word(command) in words[:1]]
     lines = getattr(asked[0], "EXAMPLES", FIRST_STEPS) if asked else FIRST_STEPS
     return "examples:\n" + "\n".join(f"  {line}" for line in lines.splitlines())

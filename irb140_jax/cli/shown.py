@@ -62,10 +62,10 @@ class Share:
         if not self._share:
             return sentence
         left = (self._clock() - self._start) * (1.0 / self._share - 1.0)
-        return f"{sentence} ({self._share:.0%} done, {_rough(left)} left)"
+        return f"{sentence} ({self._share:.0%} done, {rough(left)} left)"
 
 
-def _rough(seconds: float) -> str:
+def rough(seconds: float) -> str:
     """A time as nobody would take it for exact."""
     if seconds < 10.0:
         return "some seconds"

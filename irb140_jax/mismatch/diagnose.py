@@ -22,13 +22,16 @@ from irb140_jax.mismatch.enough import (
     undecidable,
     usable_rows,
 )
+from irb140_jax.mismatch.evidence import Posterior
 from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, fitted
 from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding, torque_scale_odds
 from irb140_jax.mismatch.model import CorrectedModel, Named, scaled, torques_along
+from irb140_jax.mismatch.motion import not_in_file, proof_in_motion
+from irb140_jax.mismatch.motion.windows import spans
 from irb140_jax.mismatch.native import native_gap
 from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, notes
-from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, refitted
+from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, recordings_of_blocks, refitted
 from irb140_jax.mismatch.provenance import provenance
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.regression.nuisances import feature_coefficients
@@ -138,7 +141,8 @@ def _diagnosed(
     model = _model(robot, ex, refit, proof, band, config.known_joints or robot.joint_names)
     logged = [s.tau for s in ex.data.stretches]
     laws = dataclasses.replace(model, discrepancy=None)  # which the file can't hold, as a note of its own says
-    corrected = [band.apply(torques_along(laws, r).corrected) for r in smooth]
+    by_laws = [torques_along(laws, r).corrected for r in smooth]
+    corrected = [band.apply(torque) for torque in by_laws]
     lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
     gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)
@@ -153,7 +157,26 @@ def _diagnosed(
     every = [*found, *torque_scale_finding(robot, ex)]
     diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
-    return Result(diagnosis, model, _views(robot, ex, proof, recordings, said), open_)
+    progress("simulating motions that the fit did not see")
+    missing = [not_in_file(model, r, torque) for r, torque in zip(smooth, by_laws, strict=True)]
+    motion = _motion(robot, ex, proof, refit.loose, band, smooth, recordings, missing)
+    return Result(diagnosis, model, _views(robot, ex, proof, recordings, said) | {"motion": motion}, open_)
+
+
+def _motion(
+    robot: Robot, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], band: Band, smooth: Sequence[Conditioned],
+    recordings: Sequence[Recording], missing: Sequence[np.ndarray],
+) -> dict[str, Any] | None:  # fmt: skip
+    """The proof in motion; None where a joint's torque was lost, so that nothing can be simulated."""
+    if any(r.torque_lost is not None and r.torque_lost.any() for r in recordings):
+        return None
+    unseen = spans([fold.blocks for fold in proof.folds], recordings_of_blocks(ex), [s.t for s in ex.data.stretches])
+
+    def of_fold(k: int) -> CorrectedModel:
+        fold = proof.folds[k]
+        return _fitted_model(robot, ex, fold.refit, loose, fold.corrected, fold.scale, band)
+
+    return rounded(proof_in_motion(robot, of_fold, unseen, smooth, missing))
 
 
 def _nothing_compared(
@@ -208,18 +231,25 @@ def _finite(recording: Recording) -> Recording:
 def _model(
     robot: Robot, ex: Explanation, refit: Refit, proof: HeldOut, band: Band, known: tuple[str, ...]
 ) -> CorrectedModel:
-    refitted_shift, _, _ = fitted(ex.data, refit.posterior(), refit.loose, ex.factor)
     post, scale, own = ex.prediction()
+    model = _fitted_model(robot, ex, refit.posterior(), refit.loose, post, scale, band)
+    discrepancy = None
+    if proof.carried.any():
+        discrepancy = Discrepancy(ex.scales, feature_coefficients(ex.extra[0], own, proof.carried))
+    return dataclasses.replace(model, known_joints=known, discrepancy=discrepancy)
+
+
+def _fitted_model(
+    robot: Robot, ex: Explanation, refit: Posterior, loose: tuple[int, ...], post: Posterior, scale: float, band: Band
+) -> CorrectedModel:
+    """The model of a posterior: of all data, or of what is left of them without a fold."""
+    refitted_shift, _, _ = fitted(ex.data, refit, loose, ex.factor)
     dphi, members, amplitudes = fitted(ex.data, post, ex.chosen, ex.factor)
     phi = np.asarray(robot.phi)
     named = [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
     phi_refit, phi_corrected = (phi + shift.reshape(phi.shape) for shift in (refitted_shift, dphi))
-    discrepancy = None
-    if proof.carried.any():
-        discrepancy = Discrepancy(ex.scales, feature_coefficients(ex.extra[0], own, proof.carried))
-    return CorrectedModel(
-        robot, phi_refit, phi_corrected, scaled(robot.n, named, scale), band, ex.scales.rest_speed, known, discrepancy
-    )
+    rest_speed = ex.scales.rest_speed
+    return CorrectedModel(robot, phi_refit, phi_corrected, scaled(robot.n, named, scale), band, rest_speed)
 
 
 def _document(

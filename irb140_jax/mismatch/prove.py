@@ -16,6 +16,23 @@ SETTLED = 2  # rounds in which the noise and what leaves it agree
 
 
 @dataclasses.dataclass(frozen=True)
+class Fold:
+    """What is left out together, and what the other blocks say.
+
+    Attributes:
+        blocks: Which blocks are left out, shape (blocks,).
+        refit: Inertials without effects.
+        corrected: Inertials and amplitudes of the findings.
+        scale: Torque scale less one.
+    """
+
+    blocks: np.ndarray
+    refit: Posterior
+    corrected: Posterior
+    scale: float
+
+
+@dataclasses.dataclass(frozen=True)
 class HeldOut:
     """Residuals on rows that the fit behind them did not see, one array (R, n) per recording [N m or N].
 
@@ -26,6 +43,7 @@ class HeldOut:
         corrected: The same, with the discrepancy where it is carried.
         use: Rows that count, (R, n).
         carried: Joints at which the discrepancy makes the error on unseen data smaller, shape (n,).
+        folds: The fits behind them.
     """
 
     nominal: list[np.ndarray]
@@ -34,6 +52,7 @@ class HeldOut:
     corrected: list[np.ndarray]
     use: list[np.ndarray]
     carried: np.ndarray
+    folds: tuple[Fold, ...] = ()
 
     @property
     def judged(self) -> np.ndarray:
@@ -52,7 +71,7 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     A motion that all but alone moves some joint, or all but alone holds what a finding does, is left out block by
     block, too: without it nothing is known there, and a wall that is touched once would drown all else.
     """
-    recording = _recordings(ex)
+    recording = recordings_of_blocks(ex)
     out, weight = [], np.vstack([np.stack([g.rows for g in ex.space.joints]), _energy(ex, ex.chosen)])
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
     of_recording = np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches])
@@ -64,7 +83,7 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     return out
 
 
-def _recordings(ex: Explanation) -> np.ndarray:
+def recordings_of_blocks(ex: Explanation) -> np.ndarray:
     """Recording of each block, shape (blocks,)."""
     return np.repeat([s.recording for s in ex.data.stretches], BLOCKS)
 
@@ -132,16 +151,18 @@ def _noise_left(stretches: list[Stretch], scale: np.ndarray, noise: Noise) -> No
 
 def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     """Residuals of the rival models, each row predicted from the other motions (or blocks)."""
-    data, energy, recording = ex.data, _energy(ex, ex.chosen), _recordings(ex)
+    data, energy, recording = ex.data, _energy(ex, ex.chosen), recordings_of_blocks(ex)
     seen = ex.posterior(instrument=False).mean
     bare = [s.of_rigid_body(refit.columns) for s in data.stretches]
     out = {"refit": [s.y.copy() for s in bare], "named": [s.y.copy() for s in data.stretches]}
     out["flexible"] = [s.y.copy() for s in data.stretches]
-    gain = np.zeros(len(ex.settings))
+    gain, fits = np.zeros(len(ex.settings)), []
     for fold in folds(ex):
         post, scale, own = ex.prediction(fold)
-        corrected = np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean) * data.scale[post.columns]
-        inertial = refit.posterior(fold).mean * data.scale[refit.columns]
+        post = dataclasses.replace(post, mean=np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean))
+        fits.append(Fold(fold, refit.posterior(fold), post, scale))
+        corrected = post.mean * data.scale[post.columns]
+        inertial = fits[-1].refit.mean * data.scale[refit.columns]
         for r, s in enumerate(data.stretches):
             mine = fold[recording == s.recording]
             edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
@@ -156,7 +177,7 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
                 gain += np.sum(old**2 - new**2, axis=0)
     nominal, use, better = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches], gain > 0.0
     carried = [np.where(better, f, c) for f, c in zip(out["flexible"], out["named"], strict=True)]
-    return HeldOut(nominal, out["refit"], out["named"], carried, use, better)
+    return HeldOut(nominal, out["refit"], out["named"], carried, use, better, tuple(fits))
 
 
 def held_out_gains(ex: Explanation) -> dict[int, float]:

@@ -13,14 +13,17 @@ from irb140_jax.mismatch.model import SCHEMA, CorrectedModel, from_json, to_json
 from irb140_jax.mismatch.native import save_native
 from irb140_jax.mismatch.undecided import Undecided, save_undecided
 
-DIAGNOSIS, MODEL, VIEWS = "diagnosis.json", "model.json", "views.json"
+DIAGNOSIS, MODEL, VIEWS, MOTION = "diagnosis.json", "model.json", "views.json", "motion.json"
 
 
 def save(result: Result, folder: pathlib.Path) -> None:
     """Write diagnosis, model, views, the corrected model as MJCF and what is undecided into an existing folder."""
     save_undecided(result.undecided, folder)
     save_native(result.model, folder)
-    for name, content in ((DIAGNOSIS, result.diagnosis), (MODEL, to_json(result.model)), (VIEWS, result.views)):
+    motion = {MOTION: result.views["motion"]} if result.views.get("motion") else {}
+    views = {key: value for key, value in result.views.items() if key != "motion"}
+    files = {DIAGNOSIS: result.diagnosis, MODEL: to_json(result.model), VIEWS: views} | motion
+    for name, content in files.items():
         text = json.dumps(content, indent=1, allow_nan=False) + "\n"
         (folder / name).write_text(text, encoding="utf-8")
 

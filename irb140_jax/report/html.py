@@ -1,20 +1,19 @@
 """The report, one HTML file that needs no network: it shows what the diagnosis holds and computes nothing."""
 
-import functools
 import json
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 
 from irb140_jax.report import figures, text
+from irb140_jax.report.motion import motion_section
 from irb140_jax.report.next_steps import next_steps
 from irb140_jax.report.overview import overview
+from irb140_jax.report.pages import PAGE, template
 from irb140_jax.report.reveal import Reveal
 
-PAGE = pathlib.Path(__file__).parent / "page"
 MODELS = {
     "nominal": "the model as given",
     "refit": "the same rigid bodies with refitted inertial parameters",
@@ -38,7 +37,7 @@ def html_report(
     known |= {"residual_spectrum": {}} | dict(views)
     joints = list(known.get("joints") or diagnosis["fit"])
     units = {joint: known["maps"].get(joint, {}).get("unit", "N m") for joint in joints}
-    return _template().render(
+    return template("report.html.j2").render(
         diagnosis=diagnosis,
         views=known,
         joints=joints,
@@ -52,6 +51,7 @@ def html_report(
         maps=[{"joint": joint, **figures.map_pair(data)} for joint, data in known["maps"].items()],
         panels=[figures.panel(joint, units[joint], known["motions"]) for joint in joints if known["motions"]],
         spectra=[figures.spectrum(joint, data, units[joint]) for joint, data in known["residual_spectrum"].items()],
+        motion=motion_section(known["motion"]) if known.get("motion") else None,
         ranking=_bars(known["ranking"]),
         models=MODELS,
         first_joint=_first_joint(diagnosis, joints),
@@ -59,22 +59,6 @@ def html_report(
         style=Markup((PAGE / "report.css").read_text(encoding="utf-8")),
         script=Markup((PAGE / "report.js").read_text(encoding="utf-8")),
     )
-
-
-@functools.cache
-def _template() -> jinja2.Template:
-    """The page, with everything from outside escaped."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(PAGE),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {show.__name__: show for show in (text.words, text.joint_list, text.evidence, text.ratio)}
-    numbers = (text.number, text.rounded_like, text.with_std, text.interval_90, text.percent)
-    environment.filters |= {show.__name__: show for show in numbers}
-    return environment.get_template("report.html.j2")
 
 
 def _first_joint(diagnosis: Mapping, joints: Sequence[str]) -> str:

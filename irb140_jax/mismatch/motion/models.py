@@ -1,0 +1,128 @@
+"""The three models as MuJoCo simulates them, and the torque that a recording puts on the joints of each."""
+
+import copy
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from irb140_jax.mismatch.consistent import consistent, is_body
+from irb140_jax.mismatch.model import CorrectedModel
+from irb140_jax.mismatch.native import native_robot
+from irb140_jax.oracle.mujoco import inverse_dynamics, mass_matrix, oracle_model
+from irb140_jax.oracle.rollout import simulated_model
+from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.robot import Robot, robot_mjcf, with_phi
+
+ENDLESS = 1e5  # [rad/s^2 or m/s^2] faster, no motor turns anything
+FLYWHEEL = 1e6  # [kg m^2 or kg] rotor of a joint that follows the recording
+MODELS = ("nominal", "refit", "corrected")
+FILE = "file"  # corrected.xml alone, where it can't hold all effects
+
+
+@dataclasses.dataclass(frozen=True)
+class Simulated:
+    """A diagnosis's models for simulation.
+
+    Attributes:
+        model: The corrected model.
+        compiled: By name; "corrected" is the text of corrected.xml.
+        gear: Joint torque in that file per torque that the controller asks for, shape (n,).
+    """
+
+    model: CorrectedModel
+    compiled: dict[str, mujoco.MjModel]
+    gear: np.ndarray
+
+    def weightless(self, recording: Conditioned) -> np.ndarray:
+        """Joints that carry nothing in one of the models, so that the recorded torque would spin them up without end,
+        shape (n,)."""
+        most = np.abs(recording.tau).max(axis=0)
+        lightest = np.min([np.diagonal(mass_matrix(m, recording.q[0])) for m in self.compiled.values()], axis=0)
+        return most > ENDLESS * lightest
+
+    def torque(self, name: str, tau: np.ndarray, missing: np.ndarray) -> np.ndarray:
+        """Torque on the joints of a model, (T, n) [N m or N].
+
+        Args:
+            name: Of the model.
+            tau: What was logged, (T, n) [N m or N].
+            missing: What of it corrected.xml can't hold (see `not_in_file`), (T, n) [N m or N].
+        """
+        if name in ("nominal", "refit"):
+            return tau
+        return (tau if name == FILE else tau - missing) * self.gear
+
+
+def not_in_file(model: CorrectedModel, recording: Conditioned, corrected: np.ndarray) -> np.ndarray:
+    """What the named laws add along a recorded motion to the torque of corrected.xml, (T, n) [N m or N].
+
+    Args:
+        model: The corrected model.
+        recording: The motion.
+        corrected: Torque of the laws along it, (T, n) [N m or N].
+    """
+    if not any(named.effect.not_in_mjcf for named in model.named):
+        return np.zeros_like(corrected)
+    robot = native_robot(model)
+    native = oracle_model(robot_mjcf(robot))
+    gear = np.asarray(robot.gear) / np.asarray(model.robot.gear)
+    moving = zip(recording.q, recording.qd, recording.qdd, strict=True)
+    own = np.array([inverse_dynamics(native, *x) for x in moving]) + native.dof_frictionloss * recording.direction
+    return corrected - own / gear
+
+
+def simulated(model: CorrectedModel, nominal: mujoco.MjModel, step: float) -> Simulated | None:
+    """The models compiled; None where MuJoCo has other joints than the robot.
+
+    Args:
+        model: The corrected model.
+        nominal: The model as given, compiled.
+        step: Time step [s].
+    """
+    corrected = native_robot(model)
+    robots = {"refit": _refitted(model), "corrected": corrected}
+    compiled = {name: compiled_robot(robot, step) for name, robot in robots.items()}
+    if any(m.nv != model.robot.n for m in compiled.values()):
+        return None
+    compiled[FILE] = compiled["corrected"]
+    return Simulated(model, {"nominal": nominal} | compiled, np.asarray(corrected.gear) / np.asarray(model.robot.gear))
+
+
+def led(models: dict[str, mujoco.MjModel], joints: np.ndarray) -> dict[str, mujoco.MjModel]:
+    """The models with such large rotors on some joints that nothing but the torque of `leading` moves them.
+
+    Args:
+        models: Compiled, by name.
+        joints: Which joints, shape (n,).
+    """
+    out = {name: copy.copy(model) for name, model in models.items()}
+    for model in out.values():
+        model.dof_armature[joints] = FLYWHEEL
+    return out
+
+
+def leading(torque: np.ndarray, recording: Conditioned, joints: np.ndarray) -> np.ndarray:
+    """The torque with that on the rotors of `led` in place of it, by which those joints follow the recording."""
+    return np.where(joints, FLYWHEEL * recording.qdd, torque)
+
+
+def compiled_robot(robot: Robot, step: float) -> mujoco.MjModel:
+    """A robot compiled for simulation.
+
+    Args:
+        robot: The robot.
+        step: Time step [s].
+    """
+    bare = jax.tree.map(np.asarray, robot)  # a number at a time is quicker out of NumPy
+    return simulated_model(robot_mjcf(bare), step)
+
+
+def _refitted(model: CorrectedModel) -> Robot:
+    """Refitted inertials of possible bodies, in the way of `native_robot`."""
+    nominal = np.asarray(model.robot.phi)
+    phi = consistent(model.phi_refit, nominal)
+    phi = np.where(np.array([is_body(p) for p in nominal])[:, None], phi, nominal)
+    return with_phi(model.robot, jnp.asarray(phi))
