@@ -160,11 +160,12 @@ ONCE = (
     # At a rate of 0.01 layers as wide as these are thrown out of the workspace by the first steps.
     Case("forward", "task", "4 x 488", 15, 250, rate=1e-3),
 )
-# What a penalty or a warm-up changes is told from what a seed changes; the same seeds for all.
+# What a penalty or a warm-up changes is told from what a seed changes; the same seeds for all.  The reading nearest to
+# the published inverse takes seven minutes a training: only its warmed up form, which never got stuck, has more seeds.
 CASES = (
     *ONCE,
     *(dataclasses.replace(case, seed=seed) for seed in range(1, 10) for case in (COLD[0], *NEAR_SINGULAR)),
-    *(dataclasses.replace(case, seed=seed) for seed in range(1, 5) for case in (COLD[1], *NEAREST)),
+    *(dataclasses.replace(case, seed=seed) for seed in range(1, 5) for case in NEAREST),
 )
 
 
@@ -224,14 +225,14 @@ def _refined(task, parts, network: learned.KinematicMlp, steps: int) -> tuple[le
 
 
 def judged(task: learned.Task, network: learned.KinematicMlp, *parts: learned.Samples) -> dict:
-    """Errors [mm] on training and validation; of an inverse, what it does near singular poses."""
+    """Errors [mm] on all three sets; of an inverse, what it does near singular poses of the third one."""
     weights = sum(x.size for x in jax.tree.leaves(eqx.filter(network.layers, eqx.is_array)))
     row: dict = {"weights": weights}
     for name, samples in zip(("training", "validation", "test"), parts, strict=True):
         error = 1e3 * np.asarray(eqx.filter_jit(learned.position_errors)(task, network, samples))
         row |= {name: _round(error.mean()), f"{name}_p95": _round(np.percentile(error, 95))}
     if task.direction == "inverse":
-        row["bins"] = binned(learned.manners(task, network, parts[1]))
+        row["bins"] = binned(learned.manners(task, network, parts[2]))
     return row
 
 
