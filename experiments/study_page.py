@@ -99,7 +99,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         network_table=network_table(network) if network else "",
         network_seeds=mlp_report.by_seed(network["cases"]) if network else "",
         near_singular=mlp_report.near_singular(network["cases"], network["tests"]) if network else "",
-        others=other_arms(folder) if of.is_studys else [],
+        others=other_arms(folder) if of.is_studys else [], choice=choice(t3["made"]["options"]),
     )  # fmt: skip
 
 
@@ -110,6 +110,12 @@ def of_circle(tracking: dict | None) -> dict:
     told = tracking["circle"]
     hours = 4.0 * told["seconds"] / 3600.0 * tracking["seeds"] / told["seeds"]
     return {"circle_table": tracking_report.table(told), "circle_seen": tracking_report.said_of_seen(told), "circle_hours": hours}
+
+
+def choice(options: dict) -> str:
+    """The arm of a result, as it was given to the command; a model by its file's name."""
+    given = {name: options[name] for name in ("robot", "joints") if options.get(name)}
+    return "".join(f" --{name} {value}" for name, value in given.items())
 
 
 def of_control(t4: dict) -> str:
