@@ -95,7 +95,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         share=f"{100 * t4['config']['share']:.0f}", mujoco=max(t4["mujoco"].values()), table5=table5(t3, t4, of.is_studys),
         torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking) if tracking else "",
         tracking_seen=tracking_report.said_of_seen(tracking) if tracking else "",
-        tracking_tests=tracking_report.said_of_tests(tracking) if tracking else "", **of_circle(tracking), of_control=of_control(t4),
+        tracking_tests=tracking_report.said_of_tests(tracking) if tracking else "", **of_circle(tracking), of_control=of_control(t4), against_gain=against_gain(t4),
         network_table=network_table(network) if network else "",
         network_seeds=mlp_report.by_seed(network["cases"]) if network else "",
         near_singular=mlp_report.near_singular(network["cases"], network["tests"]) if network else "",
@@ -123,6 +123,18 @@ def of_control(t4: dict) -> str:
     return (
         f"Reading {t4['shown'].replace('_', ' ')}; lines are medians of {t4['config']['seeds']} seeds a model, bands reach from the "
         "lowest to the highest."
+    )
+
+
+def against_gain(t4: dict) -> str:
+    """Whether the switching gain, chosen by the mass matrix, can hold the disturbance, chosen by the peak torque."""
+    size = [t4["config"]["share"] * peak for peak in t4["peak_torque"]]
+    weak = [f"{j} ({d:.2g} against {g:.2g} N m)" for j, d, g in zip(t4["joints"], size, t4["gain"], strict=True) if d > g]
+    if not weak:
+        return f"On every joint the switching gain is larger than {100 * t4['config']['share']:.0f} % of the peak torque."
+    return (
+        f"**On {', '.join(weak)} the disturbance is larger than the switching gain**, which comes from the mass matrix alone: "
+        "near its peak the arm is pushed off its path, whatever the model."
     )
 
 
