@@ -96,7 +96,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking) if tracking else "",
         tracking_seen=tracking_report.said_of_seen(tracking) if tracking else "",
         tracking_tests=tracking_report.said_of_tests(tracking) if tracking else "", **of_circle(tracking), of_control=of_control(t4), against_gain=against_gain(t4),
-        network_table=network_table(network) if network else "",
+        network_table=network_table(network) if network else "", network_on=mlp_report.judged_on(network["cases"]) if network else "",
         network_seeds=mlp_report.by_seed(network["cases"]) if network else "",
         near_singular=mlp_report.near_singular(network["cases"], network["tests"]) if network else "",
         others=other_arms(folder) if of.is_studys else [], choice=choice(t3["made"]["options"]),
@@ -317,7 +317,8 @@ def network_table(network: dict) -> str:
     lines = ["| case | weights | training, mm | validation, mm | test, mm |", "|---" * 5 + "|", "| published | | 0.48 | 0.61 | |"]
     for case in network["cases"]:
         if not case["case"]["seed"]:
-            errors = " | ".join(f"{case[part]:.3g}" for part in ("training", "validation", "test"))
+            parts = ("training", "validation", "test")
+            errors = " | ".join(f"{case[part]:.3g}" if part in case else "not run" for part in parts)
             lines.append(f"| {case['name']} | {case['weights']} | {errors} |")
     return "\n".join(lines)
 
