@@ -8,6 +8,7 @@ mean of the sets that QPSO ended with (table3_sets.json).  Writes embedded_model
 
 import dataclasses
 import json
+import os
 import pathlib
 import shutil
 import subprocess
@@ -112,7 +113,8 @@ def main(config: Config) -> None:
     """Export, measure, write."""
     set_up_compilation_cache()
     study = config.arm()
-    result = {"made": made(config.said()), "rows": run(config, study)}
+    load = os.getloadavg()[0]  # what else kept the machine busy in the minute before
+    result = {"made": made(config.said()), "load": load, "rows": run(config, study)}
     text = json.dumps(result, indent=1) + "\n"
     (config.folder(study) / "embedded_model.json").write_text(text, encoding="utf-8")
     print(text)

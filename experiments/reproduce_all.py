@@ -7,11 +7,14 @@
     python experiments/reproduce_all.py --smoke                       # all steps as small as can be, in a new folder
 
 A step whose result is there for the same choices is left out; an interrupted step goes on after the last part it
-stored, that of --again, too, if one goes on without --again.  The page, docs/study.md for the study's arm, is written
-anew each time.
+stored, that of --again, too, if one goes on without --again.  The network is trained by a process beside the others,
+as neither it nor they keep two cores busy; what measures time waits until it has the machine to itself.  The page,
+docs/study.md for the study's arm, is written anew each time.
 """
 
+import contextlib
 import dataclasses
+import functools
 import hashlib
 import json
 import pathlib
@@ -56,15 +59,17 @@ class Step:
 
     Attributes:
         title: What it makes.
-        run: Makes it.
+        run: Makes it; what is not done when it returns is a process.
         outputs: Files that are there when it is done.
         depends: What its result depends on; a change makes it run again.
+        times: Whether it measures time, and has to be alone.
     """
 
     title: str
-    run: Callable[[], None]
+    run: Callable[[], subprocess.Popen[bytes] | None]
     outputs: tuple[pathlib.Path, ...]
     depends: str
+    times: bool = False
 
     @property
     def mark(self) -> str:
@@ -84,17 +89,18 @@ def steps(config: Config, arm: StudyArm) -> list[Step]:
          [f"figure{k}.svg" for k in range(6, 10)]),
         ("table 4, figures 14 to 17: sliding mode control", table4_control, ("table4_control",),
          [f"figure{k}.svg" for k in range(14, 18)]),
-        ("time of an iteration", time_per_iteration, ("time_per_iteration",), ()),
-        ("beyond: swarms on torque", torque_swarms, ("torque_swarms",), ()),
         ("beyond: swarms whose every evaluation has new noise", noisy_swarms, ("noisy_swarms",), ()),
-        ("beyond: the model on an embedded controller", embedded_model, ("embedded_model",), ()),
         ("beyond: swarms on tracking, smoothness, energy", tracking_swarms, ("tracking_swarms",),
          ["figure_tracking.svg"]),
+        ("beyond: swarms on torque", torque_swarms, ("torque_swarms",), ()),
+        ("time of an iteration", time_per_iteration, ("time_per_iteration",), ()),
+        ("beyond: the model on an embedded controller", embedded_model, ("embedded_model",), ()),
     ):  # fmt: skip
         outputs = (*(folder / f"{name}.json" for name in results), *(figures / name for name in pictures))
         own = module.Config(**shared)
         so_far += f" {title} {own.said()}"
-        found.append(Step(title, lambda m=module, c=own: m.main(c), outputs, so_far))
+        times = module in (torque_swarms, time_per_iteration, embedded_model)
+        found.append(Step(title, lambda m=module, c=own: m.main(c), outputs, so_far, times))
     if config.quick:
         found = [step for step in found if "tracking" not in step.title]
     network = pathlib.Path(__file__).with_name("mlp_kinematics.py")
@@ -102,8 +108,8 @@ def steps(config: Config, arm: StudyArm) -> list[Step]:
     if network.is_file() and arm.is_studys and not config.smoke:
         command = [sys.executable, str(network), "--out", str(folder), "--figures", str(figures)]
         outputs = (folder / "mlp_kinematics.json", figures / "figure12.svg")
-        run = lambda: None if subprocess.run(command, check=True) else None  # noqa: E731
-        found.append(Step("figure 12: the network for the kinematics", run, outputs, "mlp"))
+        run = lambda: subprocess.Popen(command)  # noqa: E731
+        found.insert(0, Step("figure 12: the network for the kinematics", run, outputs, "mlp"))
     return found
 
 
@@ -122,17 +128,31 @@ def run(config: Config, arm: StudyArm) -> pathlib.Path:
         forget(config.folder(arm))
     done = json.loads(record.read_text(encoding="utf-8")) if record.is_file() else {}
     parts = steps(config, arm)
-    for number, step in enumerate(parts, start=1):
-        print(f"[{number}/{len(parts)}] {step.title}", flush=True)
-        there = done.get(step.title) == step.mark and all(path.is_file() for path in step.outputs)
-        if there:
-            print("      there already", flush=True)
-            continue
-        started = time.perf_counter()
-        step.run()
+    beside: list[Callable[[], None]] = []
+
+    def end(step: Step, started: float, process: subprocess.Popen[bytes] | None = None) -> None:
+        if process and process.wait():
+            raise subprocess.CalledProcessError(process.returncode, process.args)
         done[step.title] = step.mark
         record.write_text(json.dumps(done, indent=1) + "\n", encoding="utf-8")
-        print(f"      done in {time.perf_counter() - started:.0f} s", flush=True)
+        print(f"      {step.title}: done in {time.perf_counter() - started:.0f} s", flush=True)
+
+    with contextlib.ExitStack() as running:
+        for number, step in enumerate(parts, start=1):
+            print(f"[{number}/{len(parts)}] {step.title}", flush=True)
+            if done.get(step.title) == step.mark and all(path.is_file() for path in step.outputs):
+                print("      there already", flush=True)
+                continue
+            while step.times and beside:
+                beside.pop()()
+            started, process = time.perf_counter(), step.run()
+            if process is None:
+                end(step, started)
+                continue
+            running.callback(process.terminate)  # does nothing once it has ended
+            beside.append(functools.partial(end, step, started, process))
+        while beside:
+            beside.pop()()
     return study_page.write(config, arm)
 
 

@@ -95,11 +95,11 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         share=f"{100 * t4['config']['share']:.0f}", mujoco=max(t4["mujoco"].values()), table5=table5(t3, t4, of.is_studys),
         torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking) if tracking else "",
         tracking_seen=tracking_report.said_of_seen(tracking) if tracking else "",
-        tracking_tests=tracking_report.said_of_tests(tracking) if tracking else "", **of_circle(tracking), of_control=of_control(t4),
-        network_table=network_table(network) if network else "",
+        tracking_tests=tracking_report.said_of_tests(tracking) if tracking else "", **of_circle(tracking), of_control=of_control(t4), against_gain=against_gain(t4),
+        network_table=network_table(network) if network else "", network_on=mlp_report.judged_on(network["cases"]) if network else "",
         network_seeds=mlp_report.by_seed(network["cases"]) if network else "",
         near_singular=mlp_report.near_singular(network["cases"], network["tests"]) if network else "",
-        others=other_arms(folder) if of.is_studys else [],
+        others=other_arms(folder) if of.is_studys else [], choice=choice(t3["made"]["options"]),
     )  # fmt: skip
 
 
@@ -112,11 +112,29 @@ def of_circle(tracking: dict | None) -> dict:
     return {"circle_table": tracking_report.table(told), "circle_seen": tracking_report.said_of_seen(told), "circle_hours": hours}
 
 
+def choice(options: dict) -> str:
+    """The arm of a result, as it was given to the command; a model by its file's name."""
+    given = {name: options[name] for name in ("robot", "joints") if options.get(name)}
+    return "".join(f" --{name} {value}" for name, value in given.items())
+
+
 def of_control(t4: dict) -> str:
     """What figures 14 to 17 are of."""
     return (
         f"Reading {t4['shown'].replace('_', ' ')}; lines are medians of {t4['config']['seeds']} seeds a model, bands reach from the "
         "lowest to the highest."
+    )
+
+
+def against_gain(t4: dict) -> str:
+    """Whether the switching gain, chosen by the mass matrix, can hold the disturbance, chosen by the peak torque."""
+    size = [t4["config"]["share"] * peak for peak in t4["peak_torque"]]
+    weak = [f"{j} ({d:.2g} against {g:.2g} N m)" for j, d, g in zip(t4["joints"], size, t4["gain"], strict=True) if d > g]
+    if not weak:
+        return f"On every joint the switching gain is larger than {100 * t4['config']['share']:.0f} % of the peak torque."
+    return (
+        f"**On {', '.join(weak)} the disturbance is larger than the switching gain**, which comes from the mass matrix alone: "
+        "near its peak the arm is pushed off its path, whatever the model."
     )
 
 
@@ -299,8 +317,9 @@ def network_table(network: dict) -> str:
     lines = ["| case | weights | training, mm | validation, mm | test, mm |", "|---" * 5 + "|", "| published | | 0.48 | 0.61 | |"]
     for case in network["cases"]:
         if not case["case"]["seed"]:
-            test = f"{case['test']:.3g}" if "test" in case else "not run"
-            lines.append(f"| {case['name']} | {case['weights']} | {case['training']:.3g} | {case['validation']:.3g} | {test} |")
+            parts = ("training", "validation", "test")
+            errors = " | ".join(f"{case[part]:.3g}" if part in case else "not run" for part in parts)
+            lines.append(f"| {case['name']} | {case['weights']} | {errors} |")
     return "\n".join(lines)
 
 

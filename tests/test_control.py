@@ -1,5 +1,7 @@
 """Control laws against their formulas, told by MuJoCo; references against the geometry they promise."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -19,6 +21,12 @@ TOOL_DOWN = jnp.array([0.0, 0.0, 0.0, 0.0, np.pi / 2, 0.0])
 SLOPE, GAIN, LAYER, DAMPING = 8.0, np.array([30.0, 40.0, 10.0]), 0.2, 5.0
 # Torques of some 100 N m in double precision.
 ROUND_OFF = 1e-11
+# Compiling is what these tests spend their time on: whole functions are one program each, and paths of an arm have as
+# many samples as each other, so that the next test finds the program.
+POSE, TORQUE = jax.jit(kinematics.forward_kinematics), jax.jit(dynamics.inverse_dynamics)
+POSES = jax.jit(jax.vmap(kinematics.forward_kinematics, in_axes=(None, 0)))
+LAP: dict[str, Any] = {"duration": 2.0, "dt": 0.005, "ramp": 1.0}
+SLOW_LAP: dict[str, Any] = {"duration": 4.0, "dt": 0.002}
 
 
 def law(robot, model, switching, form, q, qd, wanted):
@@ -70,13 +78,18 @@ def test_sliding_mode_refuses_what_it_does_not_know(wrong):
 
 @pytest.fixture(scope="module")
 def short_circle():
-    return control.circle(ARM, duration=4.0, dt=0.002, ramp=1.0, radius=0.08, normal=(1.0, 0.0, 1.0))
+    return control.circle(ARM, **SLOW_LAP, ramp=1.0, radius=0.08, normal=(1.0, 0.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def circle_of_six_joints():
+    return control.circle(WHOLE, **LAP, radius=0.05, posture=TOOL_DOWN)
 
 
 def test_circle_is_a_circle_of_this_radius_in_this_plane(short_circle):
-    T = jax.vmap(kinematics.forward_kinematics, in_axes=(None, 0))(ARM, short_circle.q)
+    T = POSES(ARM, short_circle.q)
     normal = np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)
-    start = np.asarray(kinematics.forward_kinematics(ARM, ARM.reference)[:3, 3])
+    start = np.asarray(POSE(ARM, ARM.reference)[:3, 3])
     centre = start - 0.08 * np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0)
     away = np.asarray(T[:, :3, 3]) - centre
     assert np.allclose(away @ normal, 0.0, atol=1e-11) and np.allclose(np.linalg.norm(away, axis=1), 0.08, atol=1e-11)
@@ -92,35 +105,39 @@ def test_circle_begins_and_ends_at_rest_without_a_jolt(short_circle):
 
 
 def test_velocities_and_accelerations_are_derivatives_of_the_positions(short_circle):
-    dt = 0.002
+    dt = SLOW_LAP["dt"]
     for x, rate in ((short_circle.q, short_circle.qd), (short_circle.qd, short_circle.qdd)):
         # Central differences: off by dt^2 / 6 times a rate's second derivative, some 20 rad/s^4 where the ramp sets in.
         assert np.allclose((x[2:] - x[:-2]) / (2.0 * dt), rate[1:-1], atol=3e-5)
 
 
-def test_six_joints_keep_the_tools_orientation():
-    reference = control.circle(WHOLE, duration=2.0, dt=0.01, ramp=1.0, radius=0.05, posture=TOOL_DOWN)
-    T = jax.vmap(kinematics.forward_kinematics, in_axes=(None, 0))(WHOLE, reference.q)
-    start = kinematics.forward_kinematics(WHOLE, TOOL_DOWN)
+def test_six_joints_keep_the_tools_orientation(circle_of_six_joints):
+    reference = circle_of_six_joints
+    T = POSES(WHOLE, reference.q)
+    start = POSE(WHOLE, TOOL_DOWN)
     assert np.allclose(T[:, :3, :3], start[:3, :3], atol=1e-11)
     assert np.isclose(np.ptp(T[:, 1, 3]), 0.1, atol=1e-4)
-    assert np.allclose(np.gradient(reference.q, 0.01, axis=0)[1:-1], reference.qd[1:-1], atol=1e-3)
+    assert np.allclose(np.gradient(reference.q, LAP["dt"], axis=0)[1:-1], reference.qd[1:-1], atol=1e-3)
 
 
-def test_path_of_the_closed_form_is_that_of_the_iteration():
-    reference = control.circle(WHOLE, duration=2.0, dt=0.01, ramp=1.0, radius=0.05, posture=TOOL_DOWN)
-    q = reference.q[::20]
-    T = jax.vmap(kinematics.forward_kinematics, in_axes=(None, 0))(WHOLE, q)
-    closed = jax.vmap(lambda T, q: kinematics.nearest_solution(WHOLE, T, q)[0])(T, q)
+def test_path_of_the_closed_form_is_that_of_the_iteration(circle_of_six_joints):
+    T, q = POSES(WHOLE, circle_of_six_joints.q)[::40], circle_of_six_joints.q[::40]
+    closed = jax.jit(jax.vmap(lambda T, q: kinematics.nearest_solution(WHOLE, T, q)[0]))(T, q)
     assert np.allclose(closed, q, atol=1e-9)
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"radius": 3.0}, {"duration": 1.0}, {"normal": (0.0, 0.0, 0.0)}, {"centre": (0.0, 0.0, 5.0)}]
+    "wrong",
+    [
+        {"radius": 3.0},
+        {"duration": 1.0},
+        {"normal": (0.0, 0.0, 0.0)},
+        {"centre": (0.0, 0.0, 5.0), "posture": ARM.reference},
+    ],
 )
 def test_a_circle_that_can_not_be_is_refused(wrong):
     with pytest.raises(InputError):
-        control.circle(ARM, **{"duration": 4.0, "dt": 0.01, **wrong})
+        control.circle(ARM, **{**SLOW_LAP, **wrong})
 
 
 def test_a_path_for_two_joints_is_refused_with_what_would_do():
@@ -148,9 +165,9 @@ ARMS = {
 
 @pytest.mark.parametrize("arm", ARMS)
 def test_any_arm_gets_a_circle_which_its_joints_follow_smoothly(arm):
-    robot, dt = ARMS[arm](), 0.005
-    reference = control.circle(robot, duration=2.0, dt=dt, ramp=1.0)
-    T = np.asarray(jax.vmap(kinematics.forward_kinematics, in_axes=(None, 0))(robot, reference.q))
+    robot, dt = ARMS[arm](), LAP["dt"]
+    reference = control.circle(robot, **LAP)
+    T = np.asarray(POSES(robot, reference.q))
     # Evenly in angle, not in time: the middle of the circle is the middle of what is furthest apart.
     points = T[:, :3, 3]
     apart = np.linalg.norm(points - points[0], axis=1)
@@ -185,9 +202,9 @@ def test_any_choice_of_joints_is_mujocos_arm_with_the_others_removed(joints):
     assert arm.joint_names == tuple(f"joint{i + 1}" for i in keep)
     for seed in range(3):
         q, qd, qdd = random_state(len(keep), seed)
-        tau = dynamics.inverse_dynamics(arm, *(jnp.asarray(x) for x in (q, qd, qdd)))
+        tau = TORQUE(arm, *(jnp.asarray(x) for x in (q, qd, qdd)))
         assert np.allclose(tau, oracle.inverse_dynamics(model, q, qd, qdd), atol=ROUND_OFF)
-        T = kinematics.forward_kinematics(arm, jnp.asarray(q))
+        T = POSE(arm, jnp.asarray(q))
         assert np.allclose(T, oracle.forward_kinematics(model, q), atol=1e-13)
 
 
@@ -206,9 +223,9 @@ def test_first_joints_are_mujocos_arm_with_the_other_joints_removed():
     model = oracle.oracle_model(spec.compile())
     for seed in range(3):
         q, qd, qdd = random_state(3, seed)
-        tau = dynamics.inverse_dynamics(ARM, *(jnp.asarray(x) for x in (q, qd, qdd)))
+        tau = TORQUE(ARM, *(jnp.asarray(x) for x in (q, qd, qdd)))
         assert np.allclose(tau, oracle.inverse_dynamics(model, q, qd, qdd), atol=ROUND_OFF)
-        T = kinematics.forward_kinematics(ARM, jnp.asarray(q))
+        T = POSE(ARM, jnp.asarray(q))
         assert np.allclose(T, oracle.forward_kinematics(model, q), atol=1e-13)
 
 
@@ -217,7 +234,7 @@ def test_first_joints_may_hold_the_others_anywhere():
     arm = first_joints(WHOLE, 3, held)
     q, qd, qdd = (jnp.asarray(x) for x in random_state(3, 0))
     pad = lambda x, rest: jnp.concatenate([x, rest])  # noqa: E731
-    whole = dynamics.inverse_dynamics(WHOLE, pad(q, held[3:]), pad(qd, jnp.zeros(3)), pad(qdd, jnp.zeros(3)))
-    assert np.allclose(dynamics.inverse_dynamics(arm, q, qd, qdd), whole[:3], atol=ROUND_OFF)
-    T = kinematics.forward_kinematics(WHOLE, pad(q, held[3:]))
-    assert np.allclose(kinematics.forward_kinematics(arm, q), T, atol=1e-13)
+    whole = TORQUE(WHOLE, pad(q, held[3:]), pad(qd, jnp.zeros(3)), pad(qdd, jnp.zeros(3)))
+    assert np.allclose(TORQUE(arm, q, qd, qdd), whole[:3], atol=ROUND_OFF)
+    T = POSE(WHOLE, pad(q, held[3:]))
+    assert np.allclose(POSE(arm, q), T, atol=1e-13)

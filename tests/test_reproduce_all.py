@@ -8,12 +8,14 @@ import math
 import pathlib
 import re
 import shutil
+import subprocess
 import sys
 from typing import Any
 
 import pandas as pd
 import pytest
 
+from irb140_jax.errors import InputError
 from irb140_jax.recordings.conceal import random_robot
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "experiments"))
@@ -78,6 +80,48 @@ def test_again_forgets_every_part_but_keeps_the_results(tmp_path):
         path.write_text("{}")
     reproduce_all.forget(tmp_path)
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == [kept]
+
+
+def run_of(steps: list[reproduce_all.Step], folder: pathlib.Path, monkeypatch) -> dict[str, str]:
+    """What is recorded as done after these steps in place of the study's."""
+    monkeypatch.setattr(reproduce_all, "steps", lambda config, arm: steps)
+    monkeypatch.setattr(study_page, "write", lambda config, arm: folder / "study.md")
+    config = reproduce_all.Config(smoke=True, out=folder)
+    reproduce_all.run(config, config.arm())
+    return json.loads((folder / reproduce_all.RECORD).read_text())
+
+
+def test_what_measures_time_waits_until_the_process_beside_it_has_ended(tmp_path, monkeypatch):
+    ended, there = tmp_path / "ended", []
+    code = f"import pathlib, time; time.sleep(0.5); pathlib.Path({str(ended)!r}).touch()"
+    look = lambda: there.append(ended.exists())  # noqa: E731
+    steps = [
+        reproduce_all.Step("beside", lambda: subprocess.Popen([sys.executable, "-c", code]), (ended,), ""),
+        reproduce_all.Step("meanwhile", look, (), ""),
+        reproduce_all.Step("times", look, (), "", times=True),
+    ]
+    assert list(run_of(steps, tmp_path, monkeypatch)) == ["meanwhile", "beside", "times"]
+    assert there == [False, True]
+
+
+def test_a_process_that_fails_ends_the_run_and_is_not_done(tmp_path, monkeypatch):
+    failing = lambda: subprocess.Popen([sys.executable, "-c", "raise SystemExit(3)"])  # noqa: E731
+    steps = [reproduce_all.Step("fails", failing, (), ""), reproduce_all.Step("meanwhile", lambda: None, (), "")]
+    with pytest.raises(subprocess.CalledProcessError):
+        run_of(steps, tmp_path, monkeypatch)
+    assert list(json.loads((tmp_path / reproduce_all.RECORD).read_text())) == ["meanwhile"]
+
+
+def test_a_step_that_breaks_takes_the_process_beside_it_along(tmp_path, monkeypatch):
+    process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+
+    def broken() -> None:
+        raise InputError("nothing to be done")
+
+    steps = [reproduce_all.Step("beside", lambda: process, (), ""), reproduce_all.Step("breaks", broken, (), "")]
+    with pytest.raises(InputError):
+        run_of(steps, tmp_path, monkeypatch)
+    assert process.wait(timeout=60) != 0
 
 
 def test_errors_that_are_not_defined_are_called_so_and_nothing_is_claimed_of_them(study, tmp_path):
