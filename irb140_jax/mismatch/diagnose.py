@@ -33,7 +33,13 @@ from irb140_jax.mismatch.provenance import provenance
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.regression.nuisances import feature_coefficients
 from irb140_jax.mismatch.selection.selected import NAMED
-from irb140_jax.mismatch.servos import command_notes, of_servos, servo_sentence, without_negligible
+from irb140_jax.mismatch.servos import (
+    command_notes,
+    of_servos,
+    servo_sentence,
+    with_useful_discrepancy,
+    without_negligible,
+)
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
@@ -144,6 +150,9 @@ def _diagnosed(
     logged = [s.tau for s in ex.data.stretches]
     laws = dataclasses.replace(model, discrepancy=None)  # which the file can't hold, as a note of its own says
     corrected = [band.apply(torques_along(laws, r).corrected) for r in smooth]
+    if smooth[0].servo is not None:
+        model, harmful = with_useful_discrepancy(model, smooth, corrected)
+        servo_notes += harmful
     lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
     gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)

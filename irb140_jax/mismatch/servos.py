@@ -8,10 +8,11 @@ import numpy as np
 from scipy import stats
 
 from irb140_jax.mismatch.explanation import Explanation, parts
+from irb140_jax.mismatch.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.regression.nuisances import FIXED
 from irb140_jax.mismatch.regression.servo import NAMES
 from irb140_jax.mismatch.selection.space import RARE
-from irb140_jax.recordings.condition import INEXACT, Commanded
+from irb140_jax.recordings.condition import INEXACT, Commanded, Conditioned
 from irb140_jax.recordings.recording import Recording
 
 LATE = len(FIXED) + NAMES.index("command")
@@ -34,6 +35,36 @@ def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
         if c.slug == "inertials" or np.any(_rms(torque, ex) > INEXACT * logged):
             kept.append(index)
     return dataclasses.replace(ex, chosen=tuple(kept))
+
+
+def with_useful_discrepancy(
+    model: CorrectedModel, smooth: Sequence[Conditioned], laws: Sequence[np.ndarray]
+) -> tuple[CorrectedModel, list[str]]:
+    """The model without a discrepancy on joints where its torque is worse with it, and a note if there are such.
+
+    The fit may see another load than the model has: an error of the drive moves the inertials, and what bends with the
+    load is then scaled wrongly.
+
+    Args:
+        model: The corrected model.
+        smooth: The recordings that it was found in.
+        laws: Torque of the same without discrepancy along them, low-passed, (R, n) each.
+    """
+    if model.discrepancy is None:
+        return model, []
+    band, squares = model.band, np.zeros((2, model.robot.n))
+    for r, plain in zip(smooth, laws, strict=True):
+        rows = band.kept(len(r.t))
+        tau, both = band.apply(r.tau), (plain, band.apply(torques_along(model, r).corrected))
+        squares += [np.sum(np.where(r.usable[rows], tau - x, 0.0) ** 2, axis=0) for x in both]
+    worse = squares[1] > squares[0]
+    if not worse.any():
+        return model, []
+    coefficients = np.where(worse[:, None], 0.0, model.discrepancy.coefficients)
+    kept = dataclasses.replace(model.discrepancy, coefficients=coefficients)
+    names = ", ".join(name for name, bad in zip(model.robot.joint_names, worse, strict=True) if bad)
+    said = f"On {names} no function without a name is added in `irb140 predict`: with the model's loads it is worse."
+    return dataclasses.replace(model, discrepancy=kept if kept.coefficients.any() else None), [said]
 
 
 def _rms(torque: Sequence[np.ndarray], ex: Explanation) -> np.ndarray:

@@ -14,7 +14,7 @@ from scipy import interpolate, ndimage
 
 from irb140_jax import dynamics
 from irb140_jax.recordings.direction import REST, direction_of
-from irb140_jax.recordings.drive import DELAY_WIDTH, Drive
+from irb140_jax.recordings.drive import DELAY_WIDTH, ROWS_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.smooth import noise_density, signal_limit, white_density, without_noise
@@ -242,7 +242,7 @@ def _commanded(
     rate = np.gradient(wanted, t, axis=0)
     speed = np.zeros_like(wanted) if recording.qddes is None else filtered(
         _at(t, recording.t, recording.qddes), anti_alias)  # fmt: skip
-    width = max(DELAY_WIDTH, 0.5 * float(np.median(np.diff(recording.t))))
+    width = max(DELAY_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
     return Commanded(recording.drive, _at(grid, t, rate), _at(grid, t, speed), width)
 
 

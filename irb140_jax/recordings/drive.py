@@ -11,7 +11,9 @@ from irb140_jax.recordings.columns import ColumnMap
 from irb140_jax.robot import servos_of
 
 KP_WIDTH, KD_WIDTH = 0.10, 0.05  # relative standard deviation of a stated Kp and Kd
-DELAY_WIDTH = 5e-3  # s, of the time at which a drive takes up a command; never less than half a row
+# s and rows by which commands of one joint may act at another time than those of all joints are found to.  Not more:
+# what is explained by a delay that no model holds is missing when the model predicts.
+DELAY_WIDTH, ROWS_WIDTH = 1e-3, 0.1
 SECTIONS = ("kp", "kd", "torque_limit", "command_delay")  # of the column map
 
 

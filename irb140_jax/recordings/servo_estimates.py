@@ -19,6 +19,7 @@ from irb140_jax.recordings.torques import nominal_torques
 from irb140_jax.robot import Robot
 
 MOVING = 0.03  # of a joint's top speed: slower rows say nothing of the direction of friction
+FAR_FROM_LIMIT = 0.9  # of the torque limit, from which smoothed rows hold some that the limit cut
 PIECES = 8  # of all recordings, one of which at a time is left out to know how sure an estimate is
 LONGEST, COARSE, FINE = 0.12, 5e-3, 2.5e-4  # s: delays that are tried, first in coarse steps, then in fine ones
 CLEAR = 3.0  # standard deviations from which a delay is one, ...
@@ -63,7 +64,8 @@ def rows_of_joints(
         late = [glance(dataclasses.replace(r, tau=_later(r, d, x))).tau - seen.q for x in delays]
         for j in range(robot.n):
             qd = seen.qd[:, j]
-            use = np.abs(qd) > MOVING * np.abs(qd).max()
+            asked = np.nan_to_num(d.kp[j]) * np.abs(late[0][:, j])
+            use = (np.abs(qd) > MOVING * np.abs(qd).max()) & (asked < FAR_FROM_LIMIT * d.limit[j])
             slow, one = 0.02 * np.abs(qd).max() + 1e-12, np.ones_like(qd)
             other = np.stack([qd, np.tanh(qd / slow), seen.qdd[:, j], one, -one], axis=1)
             error = np.stack([x[use, j] for x in late])
