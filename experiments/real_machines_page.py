@@ -156,8 +156,8 @@ def legs_judged(result: dict) -> list[str]:
     within = sum(p["value"] - 2 * p["std"] <= 0.039 and p["value"] + 2 * p["std"] >= 0.031 for p in rotors)
     return [
         f"A rotor on the calf is named in {len(rotors)} of {count} diagnoses, {within} of them with an interval (two",
-        "standard deviations) that meets 0.031 to 0.039 kg m². Dry friction or a law that holds it is named on the calf",
-        f"in {rubbing} of {count}. The smallest viscous coefficient named is {min(viscous, default=0.0):.3g} N m s/rad.",
+        "standard deviations) that meets 0.031 to 0.039 kg m². Dry friction or a law that holds it is named on the",
+        f"calf in {rubbing} of {count}. The smallest viscous coefficient is {min(viscous, default=0.0):.3g} N m s/rad.",
         "Where a delay sits is left open, as the notes of each diagnosis say.", "",
     ]  # fmt: skip
 
@@ -178,11 +178,11 @@ def pendulum(result: dict) -> list[str]:
 
 
 def arm(result: dict) -> list[str]:
-    """What was named of the hobby arm with unknown gains."""
+    """What was named of the hobby arm."""
     notes = [n for n in result["arm"]["notes"] if "Kp" in n or "Commands" in n or "not judged" in n.lower()]
     return [
         "## A hobby arm (`so101`)", "",
-        f"Commands and positions at 50 Hz, gains unknown; {', '.join(result['motions'])}.",
+        f"Commands and positions at 50 Hz; Kp as published for the servo, to 40 %; {', '.join(result['motions'])}.",
         f"Verdict: `{result['arm']['verdict']}`.",
         f"Named: {named(result['arm']['findings']) or 'nothing'}.", "", *(f"- {n}" for n in notes), "",
         f"The motion in which the wrist roll is blocked, by itself: `{result['blocked_wrist_roll']['verdict']}`,",

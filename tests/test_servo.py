@@ -14,6 +14,7 @@ from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import DiagnoseConfig, diagnose, save
 from irb140_jax.recordings import drive_of_model, read_recording, stated_drive, write_recording
 from irb140_jax.recordings.servo import with_servo_torques, with_torque
+from irb140_jax.report import html_report
 
 STATED = stated_drive(np.array(KP), np.array(KD))
 # Compiling the whole library takes most of a minute; these are what a servo's errors might be taken for.
@@ -156,6 +157,11 @@ def test_friction_is_named_from_commands_alone_with_unknown_gains(rubbing):
     assert names(rubbing) == {("coulomb_friction", "elbow")}
     found = rubbing.diagnosis["findings"][0]["parameters"]["coulomb"]
     assert abs(found["value"] - 0.25) < 0.05 * 0.25 + 3.0 * found["std"]  # the scale is that of the inertials
+
+
+def test_the_report_says_that_no_torque_was_logged_and_in_which_unit_parameters_are_known(rubbing, tmp_path):
+    page = html_report(rubbing.diagnosis, rubbing.views, folder=tmp_path)
+    assert "No torque was logged" in page and "in units of that Kp only" in page
 
 
 def test_predict_compares_with_the_torque_of_the_servo_that_was_diagnosed(rubbing, tmp_path):
