@@ -171,8 +171,8 @@ def legs_judged(result: dict) -> list[str]:
         f"Held-out errors are at most the baseline's on {_listed(met) or 'none'};",
         f"larger on {_listed(missed) or 'none'}.",
         "The joints of a leg move in phase, so these sweeps hardly tell friction between two joints from each",
-        "joint's own: the couplings named here are no evidence of one. Split B is fitted on seven slow sweeps; what is named",
-        "in one split only has no support in the other.", "",
+        "joint's own: the couplings named here are no evidence of one. Split B is fitted on seven slow sweeps; what is",
+        "named in one split only has no support in the other.", "",
     ]  # fmt: skip
 
 

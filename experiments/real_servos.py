@@ -1,6 +1,6 @@
 """Diagnose three real machines from commands and positions alone, and judge what was named on motion not seen.
 
-    python experiments/real_servos.py [--machines unitree_go2 so101 bam_xl330] [--out results]
+    python experiments/real_servos.py [--machines unitree_go2 bam_xl330 so101] [--out results]
 
 unitree_go2: each leg by itself, on two splits; torque of the servo law is what is judged, as in the baseline that came
 with the data.  so101: Kp as published for the servo and known
@@ -47,7 +47,7 @@ JUDGED = 400  # gain of the pendulum's runs that are kept back
 class Config:
     """Which machines, and where to write."""
 
-    machines: tuple[str, ...] = ("unitree_go2", "so101", "bam_xl330")
+    machines: tuple[str, ...] = ("unitree_go2", "bam_xl330", "so101")
     out: pathlib.Path = pathlib.Path("results")
 
 
