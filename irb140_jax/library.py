@@ -12,6 +12,7 @@ from irb140_jax import mismatch, recordings, report
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import CorrectedRobot, DiagnoseConfig, Result
 from irb140_jax.recordings import Recording
+from irb140_jax.recordings import drive as drives
 from irb140_jax.report import text
 from irb140_jax.robot import Robot, irb140, load_robot
 from irb140_jax.tables import table_html
@@ -117,7 +118,10 @@ def diagnose(
     if not 0.0 < inertial_uncertainty <= 1.0:
         raise InputError(f"diagnose: inertial_uncertainty is {inertial_uncertainty}; give a share above 0 and up to 1")
     arm = _robot(robot)
-    read = [r if isinstance(r, Recording) else read_recording(r, arm, columns) for r in given]
+    model = {} if robot is None or isinstance(robot, Robot) else {
+        "drive": drives.drive_of_model(os.fspath(robot), arm.joint_names)
+    }  # fmt: skip
+    read = [r if isinstance(r, Recording) else read_recording(r, arm, columns, **model) for r in given]
     for r in read:
         if r.joint_names != arm.joint_names:
             raise InputError(f"diagnose: {r.source} holds joints {', '.join(r.joint_names)}; the robot {arm.name} has "

@@ -12,8 +12,16 @@ from irb140_jax.dynamics import inverse_dynamics_batch
 from irb140_jax.errors import RecordingError
 from irb140_jax.recordings import machines, read_recording
 from irb140_jax.recordings.machines import dfki_double_pendulum as pendulum
-from irb140_jax.recordings.machines import recordings_folder, staubli_tx40, write_pendulum, write_tx40
+from irb140_jax.recordings.machines import (
+    recordings_folder,
+    so101,
+    staubli_tx40,
+    unitree_go2,
+    write_pendulum,
+    write_tx40,
+)
 from irb140_jax.recordings.machines.sources import SOURCES
+from irb140_jax.recordings.servo import with_torque
 
 
 def needs(machine):
@@ -25,6 +33,7 @@ def needs(machine):
 
 
 needs_cycloidal, needs_servo = needs("cycloidal_play"), needs("bam_xl330")
+needs_go2, needs_so101 = needs("unitree_go2"), needs("so101")
 needs_tx40, needs_pendulum = needs("staubli_tx40"), needs("dfki_double_pendulum")
 
 
@@ -189,3 +198,48 @@ def test_every_source_is_pinned_to_a_commit_and_a_hash():
     for source in SOURCES.values():
         assert len(source.commit) == 40
         assert all(len(sha256) == 64 and path for path, sha256 in source.files.values())
+
+
+@needs_go2
+def test_the_go2s_servos_make_the_torque_that_is_known_of_its_legs():
+    run = machines.go2_recording()
+    assert run.is_servo_log and run.drive is not None and len(run.t) == unitree_go2.SWEEPS[-1]
+    step = float(np.median(np.diff(run.t)))
+    tau = low_pass(with_torque(run, run.drive).tau, 15.0, step)
+    held = np.zeros(len(run.t), dtype=bool)
+    for k in unitree_go2.HELD_OUT["A"]:
+        held[unitree_go2.SWEEPS[k - 1] : unitree_go2.SWEEPS[k]] = True
+    size = np.sqrt(np.mean(tau[held].reshape(-1, 4, 3) ** 2, axis=(0, 1)))  # of the four legs, by part
+    np.testing.assert_allclose(size, [1.376, 0.592, 1.260], rtol=0.01)
+
+
+@needs_go2
+def test_the_go2s_sweeps_are_cut_where_they_begin_and_short_ones_left_out():
+    fitted, held = machines.go2_split(machines.go2_recording("FL"), "A")
+    assert [r.source for r in held] == ["sweep_3", "sweep_6", "sweep_9", "sweep_12"][: len(held)]
+    assert sum(len(r.t) for r in fitted) == 601 + 562 + 481 + 441 + 362 + 322 + 242 + 200
+    assert fitted[0].joint_names == ("FL_hip_joint", "FL_thigh_joint", "FL_calf_joint")
+
+
+@needs_so101
+def test_the_so101_is_as_far_from_its_commands_as_is_known():
+    runs = [machines.so101_recording(motion) for motion in so101.HELD_OUT]
+    off = np.concatenate([r.q - r.qdes for r in runs])
+    np.testing.assert_allclose(np.sqrt(np.mean(off**2, axis=0)), [0.0310, 0.0500, 0.0513, 0.0306, 0.0457], rtol=0.02)
+
+
+@needs_so101
+def test_a_motion_that_the_so101_has_not_is_refused():
+    with pytest.raises(RecordingError, match="has no motion 'dance'"):
+        machines.so101_recording("dance")
+
+
+@needs_servo
+def test_the_pendulums_commands_make_the_torque_that_its_duty_cycle_gives():
+    run = next(name for name, (kp, trajectory) in machines.servo_runs().items() if (kp, trajectory) == (100, "sin_sin"))
+    logged, told = machines.servo_recording(run), machines.servo_commands(run)
+    assert told.drive is not None
+    made = with_torque(told, told.drive).tau[:, 0]
+    apart = made - logged.tau[: len(made), 0]
+    # Goals and duty are read one after the other: the loop has moved on by a few ms between them.
+    assert np.std(apart) < 0.25 * np.std(logged.tau[: len(made), 0])

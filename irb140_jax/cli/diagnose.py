@@ -89,13 +89,16 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
 
     def diagnosed(self) -> "Result":
         """The diagnosis of the recordings."""
-        from irb140_jax.recordings import read_recording
+        from irb140_jax.recordings import drive_of_model, read_recording
         from irb140_jax.robot import irb140_path, movable_joints
 
         hold = held_positions(self.hold)
         robot = recorded_robot(self.robot, self.recordings, self.columns, hold, self.fix_base)
         known = movable_joints(self.robot or irb140_path())
-        recordings = [read_recording(path, robot, self.columns, known_joints=known) for path in self.recordings]
+        drive = drive_of_model(self.robot or irb140_path(), robot.joint_names)
+        recordings = [
+            read_recording(path, robot, self.columns, known_joints=known, drive=drive) for path in self.recordings
+        ]
         return diagnosed(robot, recordings, self.inertial_uncertainty, self._words(), known)
 
     @staticmethod

@@ -64,11 +64,15 @@ irb140 predict d new.csv --out torque.csv --measured      with the measured torq
         """The columns, and the joints' names."""
         from irb140_jax.mismatch import load_model, predict, prediction_times
         from irb140_jax.recordings import read_recording
+        from irb140_jax.recordings.servo import with_torque
 
         model = load_model(self.folder)
         recording = read_recording(
-            self.recording, model.robot, self.columns, torque="optional", known_joints=model.known_joints
-        )
+            self.recording, model.robot, self.columns, torque="optional", known_joints=model.known_joints,
+            drive=model.drive,
+        )  # fmt: skip
+        if recording.is_servo_log and recording.drive is not None and model.drive is not None:
+            recording = with_torque(recording, recording.drive)
         if self.measured and not recording.has_torque:
             raise InputError(f"{self.recording}: holds no torque to compare with; leave --measured out")
         torque, joints = predict(model, recording), recording.joint_names

@@ -36,6 +36,13 @@ from irb140_jax.mismatch.provenance import provenance
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.regression.nuisances import feature_coefficients
 from irb140_jax.mismatch.selection.selected import NAMED
+from irb140_jax.mismatch.servos import (
+    command_notes,
+    of_servos,
+    servo_sentence,
+    with_useful_discrepancy,
+    without_negligible,
+)
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
 from irb140_jax.mismatch.undecided import Undecided, undecided
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
@@ -46,6 +53,7 @@ from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.repeats import without_copies
+from irb140_jax.recordings.servo import with_servo_torques
 from irb140_jax.robot import Robot
 
 SCHEMA = 2  # of diagnosis.json
@@ -122,15 +130,17 @@ def _diagnosed(
     robot: Robot, recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None]
 ) -> Result:
     moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
+    recordings, servo_notes = with_servo_torques(recordings, robot, config.inertial_uncertainty)
     recordings = [with_lost_torque_marked(_finite(r), moves, robot) for r in recordings]
     recordings, twice = without_copies(recordings)
     progress("smoothing and differentiating the positions")
     band, recordings, smooth, again = comparable(robot, recordings)
     if reason := too_little(smooth, band):
-        return _nothing_compared(robot, recordings, smooth, band, config, reason, [*twice, *again])
+        return _nothing_compared(robot, recordings, smooth, band, config, reason, [*servo_notes, *twice, *again])
     parts = scatter_by_sensor(robot, recordings, smooth, band)
     scatter = np.hypot(*parts)
     ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, scatter, progress)
+    ex = without_negligible(ex, smooth[0].servo)
     ex = dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= NAMED)
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
@@ -139,10 +149,14 @@ def _diagnosed(
     rest = unexplained(ex, proof)
     found = findings(robot, ex)
     model = _model(robot, ex, refit, proof, band, config.known_joints or robot.joint_names)
+    model = dataclasses.replace(model, drive=recordings[0].drive)
     logged = [s.tau for s in ex.data.stretches]
     laws = dataclasses.replace(model, discrepancy=None)  # which the file can't hold, as a note of its own says
     by_laws = [torques_along(laws, r).corrected for r in smooth]
     corrected = [band.apply(torque) for torque in by_laws]
+    if smooth[0].servo is not None:
+        model, harmful = with_useful_discrepancy(model, smooth, corrected)
+        servo_notes += harmful
     lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
     gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)
@@ -153,12 +167,14 @@ def _diagnosed(
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
     unnamed = [*friction_notes(ex, [r.source for r in smooth]), *discrepancy_notes(robot, proof)]
     coarse = coarse_positions(robot, *parts, proof.judged)
-    said = [*open_joints, *unnamed, *coarse, *twice, *again, *usual, *gap]
-    every = [*found, *torque_scale_finding(robot, ex)]
+    unnamed += command_notes(ex, smooth[0].servo)
+    said = [*servo_notes, *open_joints, *unnamed, *coarse, *twice, *again, *usual, *gap]
+    every = of_servos(ex, smooth[0].servo, [*found, *torque_scale_finding(robot, ex)])
     diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
     missing = [not_in_file(model, r, torque) for r, torque in zip(smooth, by_laws, strict=True)]
+    diagnosis["summary"] += servo_sentence(recordings)
     motion = _motion(robot, ex, proof, refit.loose, band, smooth, recordings, missing)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said) | {"motion": motion}, open_)
 
@@ -167,8 +183,8 @@ def _motion(
     robot: Robot, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], band: Band, smooth: Sequence[Conditioned],
     recordings: Sequence[Recording], missing: Sequence[np.ndarray],
 ) -> dict[str, Any] | None:  # fmt: skip
-    """The proof in motion; None where a joint's torque was lost, so that nothing can be simulated."""
-    if any(r.torque_lost is not None and r.torque_lost.any() for r in recordings):
+    """The proof in motion; None where a joint's torque was lost or never logged, so that nothing can be simulated."""
+    if smooth[0].servo is not None or any(r.torque_lost is not None and r.torque_lost.any() for r in recordings):
         return None
     unseen = spans([fold.blocks for fold in proof.folds], recordings_of_blocks(ex), [s.t for s in ex.data.stretches])
 

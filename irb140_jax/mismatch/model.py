@@ -17,6 +17,7 @@ from irb140_jax.mismatch.consistent import consistent
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.recordings.condition import Conditioned, condition
+from irb140_jax.recordings.drive import Drive
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot, with_phi
@@ -128,6 +129,7 @@ class CorrectedModel:
         known_joints: Every joint of the model's file, in its order, of which the robot may be a part: column maps
             number joints by it.
         discrepancy: What the laws leave without a name, where it helps on unseen motions.
+        drive: Of the servos, where the recordings held commands in place of torque.
     """
 
     robot: Robot
@@ -138,6 +140,7 @@ class CorrectedModel:
     rest_speed: np.ndarray
     known_joints: tuple[str, ...] = ()
     discrepancy: Discrepancy | None = None
+    drive: Drive | None = None
 
 
 def composed(
@@ -261,7 +264,7 @@ def to_json(model: CorrectedModel) -> dict[str, Any]:
             for n in model.named
         ],
         "discrepancy": model.discrepancy.to_json() if model.discrepancy else None,
-    }  # fmt: skip
+    } | ({"drive": model.drive.to_json()} if model.drive else {})  # fmt: skip
 
 
 def from_json(data: dict[str, Any]) -> CorrectedModel:
@@ -288,6 +291,7 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
         np.array(data["rest_speed"], dtype=float),
         tuple(data.get("known_joints", robot["joint_names"])),
         Discrepancy.from_json(data["discrepancy"]) if data["discrepancy"] else None,
+        Drive.from_json(data["drive"]) if data.get("drive") else None,
     )  # fmt: skip
 
 

@@ -1,5 +1,8 @@
 """Recordings: reading, checking, conditioning, excitation, and recordings with concealed physics."""
 
+from irb140_jax.recordings.drive import Drive as Drive
+from irb140_jax.recordings.drive import drive_of_model as drive_of_model
+from irb140_jax.recordings.drive import stated_drive as stated_drive
 from irb140_jax.recordings.inspection import Inspection as Inspection
 from irb140_jax.recordings.inspection import inspect_recording as inspect_recording
 from irb140_jax.recordings.joints import common_joints as common_joints

@@ -66,6 +66,8 @@ def with_lost_torque_marked(recording: Recording, least_travel: np.ndarray, robo
     Returns:
         The same with `torque_lost`, and a note for every channel concerned.
     """
+    if recording.is_servo_log:
+        return recording  # its torque was made, not logged
     lost, notes = np.zeros(recording.tau.shape, dtype=bool), list(recording.notes)
     for j, name in enumerate(recording.joint_names):
         rows = _frozen(recording.t, recording.q[:, j], recording.tau[:, j], least_travel[j])

@@ -22,7 +22,9 @@ Reader = Callable[[Any, str | None, str], Any]
 LARGEST = 2**20  # bytes of a map
 # Sections of numbers, and the channels that a joint's bare name stands for there.
 SECTIONS = {"scale": (), "offset": (), "gear_ratio": QUANTITIES, "torque_constant": ("tau",), "rated_torque": ("tau",),
-            "sign": QUANTITIES, "zero": POSITIONS}  # fmt: skip
+            "sign": QUANTITIES, "zero": POSITIONS, "kp": ("qdes",), "kd": ("qdes",), "torque_limit": ("qdes",),
+            "command_delay": ("qdes",)}  # fmt: skip
+DRIVE = ("kp", "kd", "torque_limit", "command_delay")  # sections that speak of the drive, not of a channel
 SETTINGS = ("rate", "from", "to", "first_number", "joints", "encoding", "separator", "decimal", "comment",
             "time_format", "topic", "episode")  # fmt: skip
 
@@ -226,7 +228,13 @@ def _number(section: str) -> Reader:
                                  "round")
         return float(value)
 
-    return {"scale": scale, "offset": length, "zero": length, "sign": sign}.get(section, ratio)
+    def gain(value: Any, joint: str | None, where: str) -> float:
+        if not _is_number(value) or not math.isfinite(value) or value < 0:
+            raise RecordingError(f"{where} = {value!r}; allowed is a number not below 0, in SI units on the joint side")
+        return float(value)
+
+    readers: dict[str, Reader] = {"scale": scale, "offset": length, "zero": length, "sign": sign}
+    return readers.get(section, gain if section in DRIVE else ratio)
 
 
 def _coupling(section: Any, joints: tuple[str, ...], path: pathlib.Path) -> Coupling | None:

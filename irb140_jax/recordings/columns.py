@@ -21,7 +21,7 @@ from irb140_jax.recordings.formats.options import FileOptions
 from irb140_jax.recordings.units import CURRENTS, SHARES, UNITS
 
 POSITIONS = ("q", "qdes")
-MOTIONS = (*POSITIONS, "qd", "qdd")
+MOTIONS = (*POSITIONS, "qd", "qddes", "qdd")
 QUANTITIES = (*MOTIONS, "tau")
 
 

@@ -14,6 +14,7 @@ from scipy import interpolate, ndimage
 
 from irb140_jax import dynamics
 from irb140_jax.recordings.direction import REST, direction_of, slow
+from irb140_jax.recordings.drive import DELAY_WIDTH, ROWS_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.smooth import noise_density, signal_limit, white_density, without_noise
@@ -24,7 +25,25 @@ MIN_TORQUE_BAND = 4.0  # Hz; friction reversals are steps, a narrower band would
 WORKING_RATE = 200.0  # Hz; columns are evaluated at least this often
 SLOW = 3.0  # Hz; below, model and log may differ by the very friction that is looked for
 CREEPING = 1e-3  # of a joint's highest speed in any recording: slower, what holds it may be dry friction that gives way
+INEXACT = 0.01  # of a servo's torque, by which its law may differ from the torque that it makes
 INCOHERENT = 0.05  # share of the model's torque that may be noise: what biases parameters by as much
+
+
+@dataclasses.dataclass(frozen=True)
+class Commanded:
+    """What a servo was told, on an even grid: what its torque errs by depends on it.
+
+    Attributes:
+        drive: Its gains, none unknown but of joints that are not judged.
+        command_rate: Derivative of the commanded positions, anti-aliased as the torque [rad/s or m/s], shape (T, n).
+        asked_speed: Commanded speeds [rad/s or m/s], shape (T, n).
+        delay_width: Standard deviation of the time at which commands are taken up [s].
+    """
+
+    drive: Drive
+    command_rate: np.ndarray
+    asked_speed: np.ndarray
+    delay_width: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +67,7 @@ class Conditioned:
         repeats: How many recordings there are of that motion.
         shaken: Standard deviation of what encoder noise leaves in qdd in the band of the comparison [rad/s^2 or
             m/s^2], shape (n,).
+        servo: What the servos were told, where their torque was not logged but made; else None.
     """
 
     source: str
@@ -66,6 +86,7 @@ class Conditioned:
     shaken: np.ndarray | None = None
     motion: int = -1
     repeats: int = 1
+    servo: Commanded | None = None
 
 
 def choose_band(recordings: list[Recording], robot: Robot) -> Band:
@@ -174,7 +195,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
         recording = dataclasses.replace(recording, tau=np.zeros_like(recording.q))
     t, q, tau, missing = _even(recording)
     raw_rate = (len(t) - 1) / (t[-1] - t[0])
-    tau, spikes = _despiked(tau)
+    tau, spikes = (tau, 0) if recording.is_servo_log else _despiked(tau)  # commands may jump
     h, h1, h2 = kernels(band.position, raw_rate)
     half = (len(h) - 1) // 2
     unsure = _between(tau, band, raw_rate)
@@ -205,7 +226,24 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     usable, began = ~resting & ~lost[:, None] & ~frozen, float(recording.t[0])
     moving = (recording.source, grid, q, qd, qdd, tau, usable)
     q_noise = np.sqrt(0.5 * raw_rate * white)
-    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken)
+    servo = _commanded(recording, t, anti_alias, grid) if has_torque else None
+    if servo is not None:
+        unsure = np.hypot(unsure, INEXACT * np.abs(filtered(tau, band.low_pass())))
+    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken, servo=servo)
+
+
+def _commanded(
+    recording: Recording, t: np.ndarray, anti_alias: np.ndarray, grid: np.ndarray
+) -> Commanded | None:
+    """The commands through the filters that the torque passes, or None where there are none."""
+    if recording.qdes is None or recording.drive is None:
+        return None
+    wanted = filtered(_at(t, recording.t, recording.qdes), anti_alias)
+    rate = np.gradient(wanted, t, axis=0)
+    speed = np.zeros_like(wanted) if recording.qddes is None else filtered(
+        _at(t, recording.t, recording.qddes), anti_alias)  # fmt: skip
+    width = max(DELAY_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
+    return Commanded(recording.drive, _at(grid, t, rate), _at(grid, t, speed), width)
 
 
 def _lost_torque(recording: Recording, grid: np.ndarray, reach: int) -> np.ndarray:

@@ -13,6 +13,8 @@ from irb140_jax.recordings.check import check_motion, check_times
 from irb140_jax.recordings.check_model import check_against_model
 from irb140_jax.recordings.column_file import read_column_map
 from irb140_jax.recordings.columns import ColumnMap, closest, renamed, scaled, what_came
+from irb140_jax.recordings.commands import check_commands
+from irb140_jax.recordings.drive import Drive, drive_of_map
 from irb140_jax.recordings.formats.opened import checksum
 from irb140_jax.recordings.glance import glance
 from irb140_jax.recordings.recording import Recording
@@ -25,6 +27,7 @@ from irb140_jax.robot import Robot
 def read_recording(
     path: str | pathlib.Path, robot: Robot, columns: str | pathlib.Path | None = None, *,
     torque: Literal["required", "optional"] = "required", known_joints: tuple[str, ...] | None = None,
+    drive: Drive | None = None,
 ) -> Recording:
     """Read a recording of this robot, in any format of `recordings.table`, and check it.
 
@@ -32,9 +35,11 @@ def read_recording(
         path: The file; its columns are t, q.<joint>, tau.<joint> and where logged qd.<joint>, qdd.<joint>, SI units.
         robot: The model of the robot that was recorded; gives the joints' names and what torque is plausible.
         columns: A TOML file that maps other names, units and sides, see `docs/columns.md`.
-        torque: Whether columns tau.<joint> have to be there; a planned motion has none, and its `tau` is NaN.
+        torque: Whether columns tau.<joint>, or qdes.<joint> in their place, have to be there; a planned motion has
+            none, and its `tau` is NaN.
         known_joints: Every joint that the model has, in its order, where the robot is a part of it: the map may speak
             of the others, too.
+        drive: What the model says of the drives, for logs of commands; the map's own words beat it.
 
     Returns:
         The recording.  Repairs that are safe are made and stated in its `notes`.
@@ -45,11 +50,16 @@ def read_recording(
     """
     path = pathlib.Path(path)
     recording = unchecked_recording(path, robot.joint_names, columns, torque=torque, known_joints=known_joints)
+    if recording.is_servo_log and (drive is not None or recording.drive is None):
+        stated = ColumnMap() if columns is None else read_column_map(columns, robot.joint_names, known_joints)
+        recording = dataclasses.replace(recording, drive=drive_of_map(stated, robot.joint_names, drive))
     recording = repair.without_glitches(repair.unwrapped(recording, robot.is_slide))
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
     if recording.has_torque:
         recording = check_against_model(recording, seen, robot)
+    if recording.is_servo_log:
+        check_commands(recording, robot)
     return dataclasses.replace(recording, source=path.name, sha256=checksum(path))
 
 
@@ -65,16 +75,21 @@ def unchecked_recording(
     table, notes = renamed(file.columns, column_map), file.notes
     stated = _stated(table, file.units, column_map)
     # All of the torques or none: some of them missing is more likely a wrong name than a planned motion.
-    has_torque = torque == "required" or any(f"tau.{joint}" in table for joint in joint_names)
+    logged = lambda kind: any(f"{kind}.{joint}" in table for joint in joint_names)  # noqa: E731
+    commanded = logged("qdes") and not logged("tau")
+    has_torque = not commanded and (torque == "required" or logged("tau"))
+    signals = ("q", "qdes") if commanded else ("q", "tau") if has_torque else ("q",)
     wanted = [*([] if column_map.rate and "t" not in table else ["t"]),
-              *(f"{kind}.{joint}" for kind in (("q", "tau") if has_torque else ("q",)) for joint in joint_names)]
+              *(f"{kind}.{joint}" for kind in signals for joint in joint_names)]
     _require(table, wanted, path)
-    optional = {kind: [f"{kind}.{joint}" for joint in joint_names] for kind in ("qd", "qdd")}
+    kinds = ("qd", "qdd", "qddes") if commanded else ("qd", "qdd")
+    optional = {kind: [f"{kind}.{joint}" for joint in joint_names] for kind in kinds}
     complete = {kind: names for kind, names in optional.items() if all(name in table for name in names)}
     for kind in optional.keys() - complete.keys():
         missing = [name for name in optional[kind] if name not in table]
         if len(missing) < len(joint_names):
-            notes.append(f"{kind} is not there for every joint ({missing[0]} is missing), so it is derived from q")
+            instead = "it is taken to be zero" if kind == "qddes" else "it is derived from q"
+            notes.append(f"{kind} is not there for every joint ({missing[0]} is missing), so {instead}")
     used = [*wanted, *(name for names in complete.values() for name in names)]
     if "t" in table and table["t"].dtype == object and _as_floats(table["t"])[1] is not None:
         table["t"] = seconds_of_text(table["t"], column_map.options.time_format, path)
@@ -104,6 +119,7 @@ def unchecked_recording(
         q=stacked([f"q.{joint}" for joint in joint_names]),
         tau=(stacked([f"tau.{joint}" for joint in joint_names]) if has_torque
              else np.full((len(table["t"]), len(joint_names)), np.nan)),
+        qdes=stacked([f"qdes.{joint}" for joint in joint_names]) if commanded else None,
         **{kind: stacked(names) for kind, names in complete.items()},  # pyright: ignore[reportArgumentType]
         extras={name: values for name, values in table.items() if name not in kept},
         file_t=file_t if len(file_t) > len(table["t"]) else None,
@@ -115,7 +131,7 @@ def recorded_joints(
 ) -> tuple[str, ...]:
     """Those of the known joints which a file holds, in the order in which they are known.
 
-    A joint is held by a file that has its position and, if it has any torque at all, its torque.
+    A joint is held by a file that has its position and, if it has any torque or else any command, that too.
 
     Args:
         path: The recording.
@@ -127,7 +143,8 @@ def recorded_joints(
     """
     table, column_map = named_columns(path, columns, known_joint_names)
     moved = [joint for joint in known_joint_names if f"q.{joint}" in table]
-    driven = [joint for joint in moved if f"tau.{joint}" in table]
+    driven = ([joint for joint in moved if f"tau.{joint}" in table]
+              or [joint for joint in moved if f"qdes.{joint}" in table])
     found = tuple(driven or moved)
     if column_map.numbered and found != known_joint_names[: len(found)]:
         raise RecordingError(f"{column_map.source}: joints are found by their number {{n}}, and the recording holds "

@@ -10,6 +10,7 @@ import pandas as pd
 from jaxtyping import Bool, Float
 
 from irb140_jax.errors import RecordingError
+from irb140_jax.recordings.drive import Drive
 from irb140_jax.tables import table_html
 
 WRITABLE = (".csv", ".parquet", ".npz")
@@ -32,6 +33,10 @@ class Recording:
         file_t: Time of every row of the file, those that reading left out included [s]; None where it left out none.
         sha256: Of the file it was read from; empty where it comes from none.
         torque_lost: Rows in which a torque channel is dead or frozen, shape (T, n); None where none is.
+        qdes: Commanded positions of a log that has them in place of torque [rad or m], shape (T, n), else None; `tau`
+            is then NaN until `recordings.servo` makes it.
+        qddes: Commanded velocities of such a log [rad/s or m/s], shape (T, n), or None.
+        drive: What is stated of the drives of such a log, or None.
     """
 
     t: Float[np.ndarray, " T"]
@@ -46,10 +51,13 @@ class Recording:
     file_t: Float[np.ndarray, " rows"] | None = None
     sha256: str = ""
     torque_lost: Bool[np.ndarray, "T n"] | None = None
+    qdes: Float[np.ndarray, "T n"] | None = None
+    qddes: Float[np.ndarray, "T n"] | None = None
+    drive: Drive | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.t), len(self.joint_names))
-        for name in ("q", "tau", "qd", "qdd"):
+        for name in ("q", "tau", "qd", "qdd", "qdes", "qddes"):
             value = getattr(self, name)
             if value is not None and value.shape != shape:
                 raise RecordingError(f"{self.source}: {name} has shape {value.shape}; allowed is (T, n) = {shape}, one "
@@ -69,6 +77,11 @@ class Recording:
         """Whether torque was logged; a planned motion has none."""
         return not np.isnan(self.tau).all()
 
+    @property
+    def is_servo_log(self) -> bool:
+        """Whether commanded positions stand in the place of torque."""
+        return self.qdes is not None
+
 
 def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Recording:
     """The samples `rows` of a recording, under the same name unless `source` gives another."""
@@ -77,7 +90,7 @@ def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Rec
         recording, t=recording.t[rows], q=recording.q[rows], tau=recording.tau[rows], qd=cut(recording.qd),
         qdd=cut(recording.qdd), extras={k: v[rows] for k, v in recording.extras.items()},
         source=recording.source if source is None else source, file_t=None, sha256="",
-        torque_lost=cut(recording.torque_lost),
+        torque_lost=cut(recording.torque_lost), qdes=cut(recording.qdes), qddes=cut(recording.qddes),
     )
 
 
@@ -90,12 +103,13 @@ def content_hash(recording: Recording) -> str:
 
 
 def recording_columns(recording: Recording) -> dict[str, Float[np.ndarray, " T"]]:
-    """The columns of a recording by their contract names: t, q.<joint>, qd.<joint>, qdd.<joint>, tau.<joint>, "
-      "extras."""
+    """The columns of a recording by their contract names: t, q.<joint>, qd.<joint>, qdd.<joint>, tau.<joint> or
+    qdes.<joint>, extras."""
     columns = {"t": recording.t}
-    for name in ("q", "qd", "qdd", "tau"):
+    for name in ("q", "qd", "qdd", "qdes", "qddes", "tau"):
         value = getattr(recording, name)
-        if value is not None and (name != "tau" or recording.has_torque):
+        logged = name != "tau" or (recording.has_torque and not recording.is_servo_log)
+        if value is not None and logged:
             columns |= {f"{name}.{joint}": value[:, i] for i, joint in enumerate(recording.joint_names)}
     return columns | recording.extras
 

@@ -3,6 +3,7 @@
 from irb140_jax.robot.mjcf import load_robot as load_robot
 from irb140_jax.robot.mjcf import movable_joints as movable_joints
 from irb140_jax.robot.mjcf import robot_from_model as robot_from_model
+from irb140_jax.robot.mjcf import servos_of as servos_of
 from irb140_jax.robot.robot import Robot as Robot
 from irb140_jax.robot.robot import about_origin as about_origin
 from irb140_jax.robot.robot import with_phi as with_phi

@@ -1,4 +1,4 @@
-"""What actuators add to the joints they drive: gear, effort limit, rotor inertia and damping."""
+"""What actuators add to the joints they drive: gear, effort limit, rotor inertia and damping; gains of servos."""
 
 from typing import NamedTuple
 
@@ -44,6 +44,56 @@ def drives(model: mujoco.MjModel) -> Drives:
         damping[j] = gear[j] ** 2 * damper[a]
         effort[j] = min(effort[j], abs(gear[j]) * _force_limit(model, a))
     return Drives(gear, effort, armature, damping)
+
+
+class ServoGains(NamedTuple):
+    """Gains of the servos that a model's actuators are, by joint and on the joint side; NaN where it has none.
+
+    Attributes:
+        kp: Torque per position error [N m/rad or N/m], shape (n,).
+        kd: Torque per speed error [N m s/rad or N s/m], shape (n,).
+        limit: Largest torque [N m or N], inf where nothing limits it, shape (n,).
+        low, high: Range of the commands [rad or m], shape (n,).
+    """
+
+    kp: np.ndarray
+    kd: np.ndarray
+    limit: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def servo_gains(model: mujoco.MjModel) -> ServoGains:
+    """Read actuators of MJCF's kinds `position` and `velocity`, and `general` ones that are of the same law.
+
+    force = gainprm[0] ctrl + biasprm[0] + biasprm[1] length + biasprm[2] velocity, length = gear q, torque = gear force
+
+    Args:
+        model: Compiled model.
+
+    Source: MuJoCo documentation, XML reference, actuator/general, position and velocity.
+    """
+    n = model.njnt
+    kp, kd = np.full((2, n), np.nan)
+    limit, low, high = np.full(n, np.inf), np.full(n, -np.inf), np.full(n, np.inf)
+    plain = int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtBias.mjBIAS_AFFINE), int(mujoco.mjtDyn.mjDYN_NONE)
+    for a in range(model.actuator_trntype.shape[0]):
+        j = driven_joint(model, a)
+        kinds = model.actuator_gaintype[a], model.actuator_biastype[a], model.actuator_dyntype[a]
+        if j is None or tuple(map(int, kinds)) != plain:
+            continue
+        gain, (bias, spring, damper) = float(model.actuator_gainprm[a, 0]), model.actuator_biasprm[a, :3]
+        gear = float(model.actuator_gear[a, 0])
+        position, velocity = spring == -gain, spring == 0.0 and damper == -gain
+        if bias or gain <= 0.0 or not (position or velocity):
+            continue
+        kp[j], kd[j] = gear**2 * gain * position, -(gear**2) * damper
+        if model.actuator_forcelimited[a]:
+            limit[j] = abs(gear) * float(np.abs(model.actuator_forcerange[a]).min())
+        if model.actuator_ctrllimited[a] and position:
+            low[j], high[j] = sorted(model.actuator_ctrlrange[a] / gear)
+    limit = np.minimum(limit, np.where(model.jnt_actfrclimited, np.abs(model.jnt_actfrcrange).min(axis=1), np.inf))
+    return ServoGains(kp, kd, limit, low, high)
 
 
 def driven_joint(model: mujoco.MjModel, actuator: int) -> int | None:

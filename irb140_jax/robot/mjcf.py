@@ -10,7 +10,7 @@ import numpy as np
 from irb140_jax.errors import RobotError
 from irb140_jax.robot.choose import Choice, Wish, choose, scalar_joints
 from irb140_jax.robot.description import Description, description
-from irb140_jax.robot.drive import Drives, drives
+from irb140_jax.robot.drive import Drives, ServoGains, drives, servo_gains
 from irb140_jax.robot.links import link_frames_at_rest, link_inertials, tool_frame
 from irb140_jax.robot.refuse import refuse_impossible_numbers, refuse_unsupported
 from irb140_jax.robot.robot import Robot
@@ -54,6 +54,21 @@ def movable_joints(path: str | pathlib.Path) -> tuple[str, ...]:
         RobotError: The file can't be read.
     """
     return scalar_joints(description(path).model)
+
+
+def servos_of(path: str | pathlib.Path, joints: Sequence[str]) -> ServoGains:
+    """Gains of the servos that a model file gives some joints, NaN where it gives none.
+
+    Args:
+        path: MJCF or URDF file.
+        joints: Their names.
+
+    Raises:
+        RobotError: The file can't be read.
+    """
+    model = description(path).model
+    own = [model.joint(name).id for name in joints]
+    return ServoGains(*(values[own] for values in servo_gains(model)))
 
 
 def robot_from_model(

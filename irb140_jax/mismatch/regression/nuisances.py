@@ -8,6 +8,7 @@ import numpy as np
 from irb140_jax.effects import Scales
 from irb140_jax.mismatch.along import Prepared
 from irb140_jax.mismatch.regression.discrepancy import reversal_features, smooth_features
+from irb140_jax.mismatch.regression.servo import scale_width, servo_columns
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
@@ -16,7 +17,8 @@ DELAY_COMMON, DELAY_JOINT = 1e-3, 5e-4  # s between torque and position channels
 SMOOTHED = 2e-5  # s^2 of the torque's second derivative: what smoothing takes off accelerations that noise hides
 ROTOR = 0.10  # of the stated armature
 BIAS = 0.10  # of the joint's torque: what differs by direction may go on through a reversal, or vanish there
-FIXED = ("gain", "delay", "rotor", "smoothing", "bias")  # a joint's own columns with stated widths, in their order
+# A joint's own columns with stated widths, in their order; those of a servo come after them.
+FIXED = ("gain", "delay", "rotor", "smoothing", "bias")
 SCALED = ("smooth", "reversal", "slope")  # blocks of a joint whose size is learned from the recordings
 
 
@@ -80,7 +82,9 @@ def nuisances(
         for j in range(n):
             rotor = ROTOR * float(robot.armature[j]) * motion.qdd[:, j]
             bias = BIAS * scales.torque[j] * (1.0 - np.abs(motion.direction[:, j]))
-            fixed = np.stack([GAIN_JOINT * load[:, j], DELAY_JOINT * rate[:, j], rotor, bend[:, j], bias], axis=1)
+            gain = np.hypot(GAIN_JOINT, scale_width(motion, j)) * load[:, j]
+            fixed = np.stack([gain, DELAY_JOINT * rate[:, j], rotor, bend[:, j], bias], axis=1)
+            fixed = np.concatenate([fixed, servo_columns(motion, j)], axis=1)
             # Levels of dry friction about their mean, which is a law's; of one recording there is nothing beside it.
             own = (np.arange(count) == r) - 1.0 / count
             slope = motion.direction[:, [j]] * (own if count > 1 else np.zeros(0))

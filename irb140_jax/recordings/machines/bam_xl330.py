@@ -8,6 +8,7 @@ Source: github.com/Rhoban/bam (Apache-2.0); Duclusaud, Passault, Padois, Ly, Ext
 Simulation of Servo Actuators, ICRA 2025, arXiv 2410.08650; data sheet: Robotis e-Manual, XL330-M288-T; see `sources`.
 """
 
+import dataclasses
 import json
 import pathlib
 
@@ -15,9 +16,10 @@ import numpy as np
 from scipy import signal
 
 from irb140_jax.errors import RecordingError
+from irb140_jax.recordings.drive import stated_drive
 from irb140_jax.recordings.machines.folder import published_file
 from irb140_jax.recordings.machines.sources import SOURCES
-from irb140_jax.recordings.recording import Recording, write_recording
+from irb140_jax.recordings.recording import Recording, rows_of, write_recording
 
 MACHINE = "bam_xl330"
 JOINT = "servo"
@@ -26,6 +28,7 @@ STALL_TORQUE, STALL_CURRENT, RATED_VOLTAGE = 0.52, 1.47, 5.0  # N m, A, V of the
 KT, R = STALL_TORQUE / STALL_CURRENT, RATED_VOLTAGE / STALL_CURRENT  # N m/A and ohm
 FULL_DUTY = 885.0  # counts of the duty cycle at 100 %
 WRAP = 65536  # counts; the duty is logged without its sign, in 16 bits
+ERROR_GAIN = 4096.0 / (2.0 * np.pi) / (256.0 * FULL_DUTY)  # duty per rad and unit of gain: counts of encoder and bridge
 SPEED_WINDOW = 11  # samples (60 ms) over which positions are differentiated for the back electromotive force
 
 
@@ -61,6 +64,24 @@ def servo_recording(run: str, folder: pathlib.Path | None = None) -> Recording:
     tau = enabled * motor_torque(volts, np.interp(t, grid, even))
     return Recording(t=t, q=q[:, None], tau=tau[:, None], joint_names=(JOINT,), source=run,
                      extras={"goal": column("goal_position"), "volts": volts, "enabled": enabled})  # fmt: skip
+
+
+def servo_commands(run: str, folder: pathlib.Path | None = None) -> Recording:
+    """The same run as if no duty had been logged: goals and positions, until the motor is switched off.
+
+    duty = clip(kp error_gain (goal - q), +-1),  error_gain = (4096 / 2 pi) / (256 x 885),  V = duty vin
+
+    Args:
+        run, folder: As in `servo_recording`.
+    """
+    log, whole = _read(f"{run}.json", folder), servo_recording(run, folder)
+    off = np.flatnonzero(whole.extras["enabled"] < 0.5)
+    part = rows_of(whole, slice(0, int(off[0]) if len(off) else None))
+    full = KT / R * float(log["vin"])
+    drive = stated_drive(np.array([full * log["kp"] * ERROR_GAIN]), np.array([KT**2 / R]), full)
+    return dataclasses.replace(
+        part, tau=np.full_like(part.q, np.nan), qdes=part.extras["goal"][:, None], drive=drive, extras={}
+    )
 
 
 def motor_torque(volts: np.ndarray, speed: np.ndarray) -> np.ndarray:

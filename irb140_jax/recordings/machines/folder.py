@@ -5,7 +5,7 @@ import os
 import pathlib
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.machines.sources import SOURCES
+from irb140_jax.recordings.machines.sources import DERIVED, SOURCES
 
 VARIABLE = "IRB140_RECORDINGS"
 
@@ -16,14 +16,20 @@ def recordings_folder(machine: str) -> pathlib.Path:
     Raises:
         RecordingError: It is in neither place; the message says how to get the files.
     """
-    if machine not in SOURCES:
-        raise RecordingError(f"no published recordings of '{machine}' are known; allowed is {', '.join(SOURCES)}")
+    known = SOURCES | DERIVED
+    if machine not in known:
+        raise RecordingError(f"no published recordings of '{machine}' are known; allowed is {', '.join(known)}")
     checkout = pathlib.Path(__file__).resolve().parents[3]
     named = os.environ.get(VARIABLE)
     places = [pathlib.Path(named)] if named else [checkout.parent / "shared" / "recordings"]
     for place in places:
         if (place / machine).is_dir():
             return place / machine
+    if machine in DERIVED:
+        source = DERIVED[machine]
+        raise RecordingError(
+            f"the recordings of {machine} are not in {places[0]}; they were made from github.com/{source.repository}, "
+            f"commit {source.commit[:10]}, as docs/recordings.md says; put them there, or set {VARIABLE}=FOLDER")
     source = SOURCES[machine]
     raise RecordingError(
         f"the published recordings of {machine} are not in {places[0]}; fetch them with `python -m "
@@ -38,12 +44,13 @@ def published_file(machine: str, name: str, folder: pathlib.Path | None = None) 
         RecordingError: It is missing or differs from the published one.
     """
     path = (folder or recordings_folder(machine)) / name
-    repository_path, sha256 = SOURCES[machine].files[name]
+    source = (SOURCES | DERIVED)[machine]
+    repository_path, sha256 = source.files[name]
     if not path.is_file():
-        raise RecordingError(f"{path}: missing; it is {repository_path} of github.com/{SOURCES[machine].repository} at "
-                             f"commit {SOURCES[machine].commit}: {SOURCES[machine].url(name)}")
+        raise RecordingError(f"{path}: missing; it is {repository_path} of github.com/{source.repository} at "
+                             f"commit {source.commit}: {source.url(name)}")
     came = hashlib.sha256(path.read_bytes()).hexdigest()
     if came != sha256:
         raise RecordingError(f"{path}: its SHA-256 is {came[:12]}..., the published file's is {sha256[:12]}...; fetch "
-                             f"it again from {SOURCES[machine].url(name)}")
+                             f"it again from {source.url(name)}")
     return path

@@ -255,3 +255,86 @@ SOURCES = {
         },
     ),
 }
+
+
+# Files that were made from published ones: they lie with those that are fetched, and can't be downloaded as they are.
+DERIVED = {
+    "unitree_go2": Source(
+        "iit-DLSLab/sim2real-robot-identification", "06739ea0424fa8b2e141df0942ecdaf27a5c8600", "BSD-3-Clause",
+        {
+            "log.csv": (
+                "datasets/go2/traj_0.pt",
+                "cf90d01f91be2bf59180935758198079fe1d0a31b6327345bebaa2943e7154e4",
+            ),
+            "go2_fixed_base_nominal.xml": (
+                "robot_model/go2/go2.xml",
+                "a92c1c0a7057c5716d0fc6bbcab43c87787d77ff3ccaf3f5b71c25de67ed59a8",
+            ),
+        },
+    ),
+    "so101": Source(
+        "isaac-sim2real/sage", "4ffd2627df9d23e279b35712a67e629ce0c0dfa7", "Apache-2.0",
+        {
+            "backlash_detection.csv": (
+                "output/real/so101/custom/backlash_detection/state_motor.csv",
+                "2052fa7339984b66604311d3181ec686e816d8e08d07c94d2dacdb907564236e",
+            ),
+            "chirp_sweep.csv": (
+                "output/real/so101/custom/chirp_sweep/state_motor.csv",
+                "e17f2734270fc909d4b87dfbaa564a8f9bdf153d6256879c9e8f75fba3a46f7c",
+            ),
+            "friction_gravity.csv": (
+                "output/real/so101/custom/friction_gravity/state_motor.csv",
+                "6b255b3f3ce56d7a7b0b8ab0e852b71684af2f73fdf97a170d6e2ef087dc1f2a",
+            ),
+            "hold_under_gravity.csv": (
+                "output/real/so101/custom/hold_under_gravity/state_motor.csv",
+                "2d88d8400d23a175767f5f20d133a6be35f6568f20e91aa904187ca27c59fd67",
+            ),
+            "large_amplitude.csv": (
+                "output/real/so101/custom/large_amplitude/state_motor.csv",
+                "b78855c31f2a920463f77377e3e82b847043dbe8311a6a33e6815f564436b1ed",
+            ),
+            "multisine.csv": (
+                "output/real/so101/custom/multisine/state_motor.csv",
+                "ebfb582500374306360b15a98d48403bb622c1cf2dab5a1290c1bd68eb12ce18",
+            ),
+            "pick_place.csv": (
+                "output/real/so101/custom/pick_place/state_motor.csv",
+                "b57fa2bcc3b1f7cd7f3d07f15a72abfc005e2a04a45d8904a1caea37768d5137",
+            ),
+            "prbs_excitation.csv": (
+                "output/real/so101/custom/prbs_excitation/state_motor.csv",
+                "bbc368c503c4752702a60f04d5cde0a35d03f7352211d8ab1ca34991a805a25d",
+            ),
+            "single_joint_elbow.csv": (
+                "output/real/so101/custom/single_joint_elbow/state_motor.csv",
+                "d588687529a939b28cdbb3067d2801976ba0690379f6c76c71cd22db5b72c007",
+            ),
+            "single_joint_rotation.csv": (
+                "output/real/so101/custom/single_joint_rotation/state_motor.csv",
+                "faf17b12f8dd1f588f09e5f2fb79f7b3dcee0f76af4f3a3f1a836af76d26814d",
+            ),
+            "single_joint_wrist_roll.csv": (
+                "output/real/so101/custom/single_joint_wrist_roll/state_motor.csv",
+                "48d59be60b9e31f3af65fb1ff5b9da50ae7129df22c52040506dbd285fd581e8",
+            ),
+            "static_holding.csv": (
+                "output/real/so101/custom/static_holding/state_motor.csv",
+                "cf77c5c8860493feee1390ab227e97a8b210c84f2fc67a909924570d9e8f88c8",
+            ),
+            "step_response.csv": (
+                "output/real/so101/custom/step_response/state_motor.csv",
+                "7567986590c8bc594e0f93ec33764c4d146cedbe0568525cda4aa221c5bd4a16",
+            ),
+            "velocity_ramp.csv": (
+                "output/real/so101/custom/velocity_ramp/state_motor.csv",
+                "1edd3e6a30ad229949ded83a30228c0ddc9231e8cfa8191564b8ccdfbd401b6f",
+            ),
+            "so101_new_calib.urdf": (
+                "Simulation/SO101/so101_new_calib.urdf",  # of TheRobotStudio/SO-ARM100, commit fda892cb
+                "1b29612da183d4a670771f35fc40f487d1a2f8c646ae58220cf3061958a7dd26",
+            ),
+        },
+    ),
+}

@@ -1,0 +1,135 @@
+"""Diagnose three real machines from commands and positions alone, and judge what was named on motion not seen.
+
+    python experiments/real_servos.py [--machines unitree_go2 bam_xl330 so101] [--out results]
+
+unitree_go2: each leg by itself, on two splits; torque of the servo law is what is judged, as in the baseline that came
+with the data.  so101: Kp as published for the servo and known
+to 40 %, no Kd, five joints; its position error is not judged, for that needs the loop simulated.
+bam_xl330: the duty cycle that was logged is withheld.  Every machine's result is a file of its own.
+"""
+
+import dataclasses
+import json
+import pathlib
+from typing import Any
+
+import numpy as np
+import tyro
+from scipy import signal
+
+from irb140_jax.compilation_cache import set_up_compilation_cache
+from irb140_jax.mismatch import Result, diagnose, predict
+from irb140_jax.recordings import Recording
+from irb140_jax.recordings.drive import Drive
+from irb140_jax.recordings.machines import (
+    go2_model,
+    go2_recording,
+    go2_split,
+    servo_commands,
+    servo_model,
+    servo_runs,
+    so101_model,
+    so101_recording,
+)
+from irb140_jax.recordings.machines.unitree_go2 import HELD_OUT, LEGS, PARTS, SWEEPS, go2_joints
+from irb140_jax.recordings.servo import with_torque
+from irb140_jax.robot import load_robot
+
+CUTOFF, ENDS = 15.0, 0.15  # Hz and s of the baseline's comparison: both sides filtered both ways, ends left out
+# Root mean square over the legs on held-out sweeps, with offsets and a delay [N m].
+BASELINE = {"A": (0.093, 0.058, 0.266), "B": (0.136, 0.092, 0.305)}
+RIGID = {"A": (0.401, 0.403, 1.237), "B": (0.465, 0.489, 1.451)}
+ARM_MOTIONS = ("chirp_sweep", "multisine")
+JUDGED = 400  # gain of the pendulum's runs that are kept back
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """Which machines, and where to write."""
+
+    machines: tuple[str, ...] = ("unitree_go2", "bam_xl330", "so101")
+    out: pathlib.Path = pathlib.Path("results")
+
+
+def told(result: Result) -> dict[str, Any]:
+    """What a diagnosis says, without its provenance."""
+    return {key: result.diagnosis[key] for key in ("verdict", "summary", "findings", "unexplained", "fit", "notes")}
+
+
+def go2() -> dict[str, Any]:
+    """Diagnoses of every leg on both splits, and their errors on held-out sweeps."""
+    out: dict[str, Any] = {"baseline": BASELINE, "rigid_of_the_baseline": RIGID, "splits": {}}
+    for split in HELD_OUT:
+        legs = {}
+        for leg in LEGS:
+            robot, run = load_robot(go2_model(), go2_joints(leg)), go2_recording(leg)
+            result = diagnose(robot, go2_split(run, split)[0])
+            legs[leg] = {"heldout": heldout(result, run, HELD_OUT[split]), **told(result)}
+            print(split, leg, legs[leg]["heldout"], flush=True)
+        over = {
+            model: np.sqrt(np.mean([np.square(x["heldout"][model]) for x in legs.values()], axis=0)).tolist()
+            for model in ("nominal", "refit", "corrected")
+        }
+        out["splits"][split] = {"rmse_by_part": dict(over, parts=list(PARTS)), "legs": legs}
+    return out
+
+
+def heldout(result: Result, run: Recording, sweeps: tuple[int, ...]) -> dict[str, list[float]]:
+    """Error of each model's torque on some sweeps, low-passed as the baseline's [N m], by joint."""
+    drive = result.model.drive
+    assert drive is not None
+    made = with_torque(run, drive)
+    step = float(np.median(np.diff(run.t)))
+    sos = signal.butter(2, 2.0 * CUTOFF * step, output="sos")
+    models = predict(result.model, made)
+    rows = np.zeros(len(run.t), dtype=bool)
+    for k in sweeps:
+        rows[SWEEPS[k - 1] : SWEEPS[k]] = True
+    rows &= (run.t > run.t[0] + ENDS) & (run.t < run.t[-1] - ENDS)
+    left = {name: signal.sosfiltfilt(sos, made.tau - torque, axis=0)[rows] for name, torque in models.items()}
+    return {name: np.sqrt(np.mean(x**2, axis=0)).tolist() for name, x in left.items()}
+
+
+def so101() -> dict[str, Any]:
+    """A diagnosis of five joints, and one of the wrist roll that is blocked."""
+    robot = load_robot(so101_model(), tuple(so101_recording("multisine").joint_names))
+    whole = told(diagnose(robot, [so101_recording(motion) for motion in ARM_MOTIONS]))
+    roll = load_robot(so101_model(), ("wrist_roll",))
+    stop = told(diagnose(roll, [only(so101_recording("single_joint_wrist_roll"), "wrist_roll")]))
+    return {"motions": list(ARM_MOTIONS), "arm": whole, "blocked_wrist_roll": stop}
+
+
+def only(r: Recording, joint: str) -> Recording:
+    """A recording of one joint alone."""
+    j = [r.joint_names.index(joint)]
+    assert r.qdes is not None and r.drive is not None
+    parts = {f.name: getattr(r.drive, f.name)[j] for f in dataclasses.fields(r.drive) if f.name != "said"}
+    drive = Drive(**parts, said=(r.drive.said[j[0]],))
+    return Recording(t=r.t, q=r.q[:, j], tau=r.tau[:, j], qdes=r.qdes[:, j], joint_names=(joint,), source=r.source,
+                     drive=drive)
+
+
+def bam(folder: pathlib.Path) -> dict[str, Any]:
+    """The pendulum's diagnosis from goals and positions."""
+    model = folder / "servo.xml"
+    model.write_text(servo_model(), encoding="utf-8")
+    robot = load_robot(model)
+    return told(diagnose(robot, [servo_commands(name) for name, (kp, _) in servo_runs().items() if kp != JUDGED]))
+
+
+def main() -> None:
+    import tempfile
+
+    config = tyro.cli(Config)
+    set_up_compilation_cache()
+    config.out.mkdir(parents=True, exist_ok=True)
+    for machine in config.machines:
+        with tempfile.TemporaryDirectory() as folder:
+            result = {"unitree_go2": go2, "so101": so101, "bam_xl330": lambda f=folder: bam(pathlib.Path(f))}[machine]()
+        path = config.out / f"real_servo_{machine}.json"
+        path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        print(path, flush=True)
+
+
+if __name__ == "__main__":
+    main()

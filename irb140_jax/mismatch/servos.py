@@ -1,0 +1,146 @@
+"""What a diagnosis of servo logs must say beside its findings: which classes an error of the drive falls into."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from irb140_jax.mismatch.explanation import Explanation, parts
+from irb140_jax.mismatch.model import CorrectedModel, torques_along
+from irb140_jax.mismatch.regression.nuisances import FIXED
+from irb140_jax.mismatch.regression.servo import NAMES
+from irb140_jax.mismatch.selection.space import RARE
+from irb140_jax.recordings.condition import INEXACT, Commanded, Conditioned
+from irb140_jax.recordings.recording import Recording
+
+LATE = len(FIXED) + NAMES.index("command")
+DAMPER = len(FIXED) + NAMES.index("kd")
+NOTABLE = 1e-3  # s, by which commands must be late to be worth a note
+LAGS = ("actuator_lag", "time_delay", "channel_skew")  # effects that a late command can't be told from
+
+
+def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
+    """The explanation without effects smaller than a servo's torque is sure to be what its law says, at every joint."""
+    if servo is None:
+        return ex
+    post = ex.posterior()
+    w = post.mean * ex.data.scale[post.columns]
+    logged = _rms([s.tau for s in ex.data.stretches], ex)
+    kept = []
+    for index, rows in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
+        c = ex.data.candidates[index]
+        torque = [s.X[..., ex.data.nuisances + c.columns] @ w[rows] for s in ex.data.stretches]
+        if c.slug == "inertials" or np.any(_rms(torque, ex) > INEXACT * logged):
+            kept.append(index)
+    return dataclasses.replace(ex, chosen=tuple(kept))
+
+
+def with_useful_discrepancy(
+    model: CorrectedModel, smooth: Sequence[Conditioned], laws: Sequence[np.ndarray]
+) -> tuple[CorrectedModel, list[str]]:
+    """The model without a discrepancy on joints where its torque is worse with it, and a note if there are such.
+
+    The fit may see another load than the model has: an error of the drive moves the inertials, and what bends with the
+    load is then scaled wrongly.
+
+    Args:
+        model: The corrected model.
+        smooth: The recordings that it was found in.
+        laws: Torque of the same without discrepancy along them, low-passed, (R, n) each.
+    """
+    if model.discrepancy is None:
+        return model, []
+    band, squares = model.band, np.zeros((2, model.robot.n))
+    for r, plain in zip(smooth, laws, strict=True):
+        rows = band.kept(len(r.t))
+        tau, both = band.apply(r.tau), (plain, band.apply(torques_along(model, r).corrected))
+        squares += [np.sum(np.where(r.usable[rows], tau - x, 0.0) ** 2, axis=0) for x in both]
+    worse = squares[1] > squares[0]
+    if not worse.any():
+        return model, []
+    coefficients = np.where(worse[:, None], 0.0, model.discrepancy.coefficients)
+    kept = dataclasses.replace(model.discrepancy, coefficients=coefficients)
+    names = ", ".join(name for name, bad in zip(model.robot.joint_names, worse, strict=True) if bad)
+    said = f"On {names} no function without a name is added in `irb140 predict`: with the model's loads it is worse."
+    return dataclasses.replace(model, discrepancy=kept if kept.coefficients.any() else None), [said]
+
+
+def _rms(torque: Sequence[np.ndarray], ex: Explanation) -> np.ndarray:
+    """Root mean square over the rows in which each joint counts, shape (n,)."""
+    use = [s.use for s in ex.data.stretches]
+    rows = np.maximum(sum(u.sum(axis=0) for u in use), 1)
+    return np.sqrt(sum(np.sum(np.where(u, x, 0.0) ** 2, axis=0) for x, u in zip(torque, use, strict=True)) / rows)
+
+
+def of_servos(ex: Explanation, servo: Commanded | None, found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Findings of servo logs, each with what an error of the drive's gains or clock would look like in its place."""
+    if servo is None:
+        return found
+    out, names = [], list(ex.lib.robot.joint_names)
+    for f in found:
+        said = ""
+        if f["effect"] == "viscous_friction":
+            j = names.index(f["joints"][0])
+            off = float(servo.drive.kd_width[j] * _own(ex, j)[0][DAMPER])
+            both = f["parameters"]["viscous"]["value"] + float(servo.drive.kd[j]) + off
+            said = (
+                f" It is one class with the drive's Kd, taken as {servo.drive.kd[j]:.3g}: what is known is the sum of "
+                f"both, {both:.3g}; two Kd, or an unpowered motion, would tell them apart."
+            )
+        elif f["effect"] == "torque_gain":
+            said = " On a servo this is an error of the stated Kp, or of the masses that it is compared with."
+        elif f["effect"] in LAGS:
+            said = (
+                " Where it sits can't be told from the fit: a command that is taken up late, a lag of the drive's "
+                "torque and clocks out of step are one class here."
+            )
+        elif f["effect"] == "rotor_inertia":
+            said = " A command that is taken up late changes this number: it moves with the torque's phase."
+        out.append(f | {"certain": f["certain"] + said})
+    return out
+
+
+def command_notes(ex: Explanation, servo: Commanded | None) -> list[str]:
+    """A note for every servo that takes up its commands late, or whose torque lags as much.
+
+    Its odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
+    any rare effect.
+    """
+    if servo is None:
+        return []
+    out = []
+    for j in range(ex.lib.robot.n):
+        own, spread = (x[LATE] for x in _own(ex, j))
+        odds = stats.norm.logpdf(0.0) - stats.norm.logpdf(0.0, own, spread) + np.log(RARE)
+        if odds > 0.0 and abs(servo.delay_width * own) > NOTABLE:
+            late, width = 1e3 * servo.delay_width * own, 1e3 * servo.delay_width * spread
+            way = "late" if own > 0 else "early"
+            out.append(
+                f"Commands of {ex.lib.robot.joint_names[j]} act {abs(late):.2g} +- {width:.1g} ms {way}; this is taken "
+                "into account. Whether the command is taken up late, the drive's torque lags, or the clocks are out of "
+                "step can't be told from the fit."
+            )
+    return out
+
+
+def _own(ex: Explanation, j: int) -> tuple[np.ndarray, np.ndarray]:
+    """A joint's own nuisance parameters in prior standard deviations, and how sure they are."""
+    mean, _ = ex.space.posterior(ex.chosen, ex.settings)
+    columns, setting = ex.space.set_columns(ex.chosen), ex.settings[j]
+    own = ex.space.own(j, setting, columns, mean, instrument=True)
+    return own, ex.space.joints[j].at(setting).spread()
+
+
+def servo_sentence(recordings: Sequence[Recording]) -> str:
+    """A sentence for the summary; empty where torque was logged."""
+    drives = [r.drive for r in recordings if r.is_servo_log and r.drive is not None]
+    if not drives:
+        return ""
+    guessed = [name for name, said in zip(recordings[0].joint_names, drives[0].said, strict=True) if said == "estimate"]
+    unit = f"; on {', '.join(guessed)} Kp is estimated, so torque is in units of it" if guessed else ""
+    return (
+        f" No torque was logged: it is that of the servos, Kp (qdes - q) - Kd qd{unit}. Names found in such logs are less "
+        "sure than their probabilities say: on real servos several of them were wrong (docs/real-machines.md)."
+    )

@@ -1,0 +1,124 @@
+"""What is stated of the drives of a robot that logs commands instead of torque."""
+
+import dataclasses
+import pathlib
+from typing import Any
+
+import numpy as np
+
+from irb140_jax.errors import RecordingError
+from irb140_jax.recordings.columns import ColumnMap
+from irb140_jax.robot import servos_of
+
+KP_WIDTH, KD_WIDTH = 0.10, 0.05  # relative standard deviation of a stated Kp and Kd
+# s and rows by which commands of one joint may act at another time than those of all joints are found to.  Not more:
+# what is explained by a delay that no model holds is missing when the model predicts.
+DELAY_WIDTH, ROWS_WIDTH = 1e-3, 0.1
+SECTIONS = ("kp", "kd", "torque_limit", "command_delay")  # of the column map
+
+
+@dataclasses.dataclass(frozen=True)
+class Drive:
+    """Position servos: torque = Kp (qdes(t - delay) - q) + Kd (qddes - qd), within +- limit.
+
+    Attributes:
+        kp: Torque per position error [N m/rad or N/m], NaN where it is not known, shape (n,).
+        kd: Torque per speed error [N m s/rad or N s/m], NaN where it is not known, shape (n,).
+        limit: Largest torque [N m or N], inf where none is stated, shape (n,).
+        low, high: Range to which commands are cut [rad or m], shape (n,).
+        delay: Time after its row at which a command is taken up [s], shape (n,).
+        kp_width: Relative standard deviation of kp, shape (n,).
+        kd_width: Standard deviation of kd [N m s/rad or N s/m], shape (n,).
+        said: Where each joint's gains come from: "model", "map", "estimate" or "", in the order of the joints.
+    """
+
+    kp: np.ndarray
+    kd: np.ndarray
+    limit: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    delay: np.ndarray
+    kp_width: np.ndarray
+    kd_width: np.ndarray
+    said: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything of it as JSON, where infinity and what is unknown are words."""
+        word = lambda x: x if np.isfinite(x) else str(x)  # noqa: E731
+        arrays = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "said"}
+        return {k: [word(x) for x in v.tolist()] for k, v in arrays.items()} | {"said": list(self.said)}
+
+    @staticmethod
+    def from_json(data: dict[str, Any]) -> "Drive":
+        """The inverse of `to_json`."""
+        arrays = {k: np.array([float(x) for x in v]) for k, v in data.items() if k != "said"}
+        return Drive(**arrays, said=tuple(data["said"]))
+
+
+def unknown_drive(n: int) -> Drive:
+    """Drives of which nothing is stated."""
+    missing, none, free = np.full(n, np.nan), np.zeros(n), np.full(n, np.inf)
+    return Drive(missing, missing, free, -free, free, none, none, none, ("",) * n)
+
+
+def stated_drive(kp: np.ndarray, kd: np.ndarray, limit: float | np.ndarray = np.inf, said: str = "map") -> Drive:
+    """Drives with these gains.
+
+    Args:
+        kp: [N m/rad or N/m], shape (n,).
+        kd: [N m s/rad or N s/m], shape (n,).
+        limit: Largest torque [N m or N].
+        said: Where they come from.
+    """
+    n = len(kp)
+    return _with_widths(dataclasses.replace(
+        unknown_drive(n), kp=np.array(kp, dtype=float), kd=np.array(kd, dtype=float),
+        limit=np.broadcast_to(np.asarray(limit, dtype=float), (n,)).copy(), said=(said,) * n,
+    ))  # fmt: skip
+
+
+def drive_of_model(path: str | pathlib.Path, joints: tuple[str, ...]) -> Drive:
+    """Drives by a model file's actuators, unknown at joints where those are no servos."""
+    gains = servos_of(path, joints)
+    said = tuple("" if np.isnan(kp) else "model" for kp in gains.kp)
+    unknown = unknown_drive(len(joints))
+    return _with_widths(dataclasses.replace(unknown, **gains._asdict(), said=said))
+
+
+def drive_of_map(columns: ColumnMap, joints: tuple[str, ...], otherwise: Drive | None = None) -> Drive:
+    """Drives by the sections [kp], [kd], [torque_limit] and [command_delay] of a column map.
+
+    Args:
+        columns: The map.
+        joints: Names of the joints.
+        otherwise: What the model says, where the map says nothing.
+
+    Raises:
+        RecordingError: A gain or limit of zero.
+    """
+    drive = otherwise or unknown_drive(len(joints))
+    given = {section: columns.values(section) for section in SECTIONS}
+    if not any(given.values()):
+        return drive
+    for section, values in given.items():
+        for channel, value in values.items():
+            if float(value) == 0.0 and section in ("kp", "torque_limit"):
+                raise RecordingError(f"{columns.source}: [{section}] {channel.partition('.')[2]} = 0; allowed is a "
+                                     "positive number in SI units on the joint side")
+    def at(section: str, old: np.ndarray) -> np.ndarray:
+        new = [given[section].get(f"qdes.{joint}") for joint in joints]
+        return np.array([float(x if y is None else y) for x, y in zip(old, new, strict=True)])
+
+    mapped = lambda joint: f"qdes.{joint}" in given["kp"]  # noqa: E731
+    said = tuple("map" if mapped(joint) else old for joint, old in zip(joints, drive.said, strict=True))
+    return _with_widths(dataclasses.replace(
+        drive, kp=at("kp", drive.kp), kd=at("kd", drive.kd), limit=at("torque_limit", drive.limit),
+        delay=at("command_delay", drive.delay), said=said,
+    ))  # fmt: skip
+
+
+def _with_widths(drive: Drive) -> Drive:
+    """The drives with the widths that stated gains are taken to have."""
+    kp_width = np.where(np.isnan(drive.kp), 0.0, KP_WIDTH)
+    kd_width = np.where(np.isnan(drive.kd), 0.0, KD_WIDTH * np.abs(drive.kd))
+    return dataclasses.replace(drive, kp_width=kp_width, kd_width=kd_width)

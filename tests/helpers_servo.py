@@ -1,0 +1,48 @@
+"""Closed loops in MuJoCo with its own position actuators as the plant: recordings of commands and positions."""
+
+import mujoco
+import numpy as np
+
+from irb140_jax.recordings import Recording
+
+JOINTS = ("shoulder", "elbow")
+KP, KD = (60.0, 30.0), (2.0, 0.8)
+STEP = 2.5e-4  # s of the simulation: a servo's damping through a step of 1 ms looks like 1 ms of delay
+RATE = 200.0  # Hz of the log
+NOISE = 1e-4  # rad, a 16 bit encoder
+
+
+def two_links(kp=KP, kd=KD, shoulder="", elbow="", limit=None, actuators=None, gear=1.0):
+    """MJCF of two links on position actuators; further attributes of the joints are the concealed physics."""
+    limited = "" if limit is None else f'forcerange="-{limit} {limit}"'
+    own = "".join(f'<position joint="{joint}" kp="{kp[i]}" kv="{kd[i]}" gear="{gear}" {limited}/>'
+                  for i, joint in enumerate(JOINTS))  # fmt: skip
+    return f"""<mujoco model="two_links"><compiler angle="radian"/>
+<option timestep="{STEP}" gravity="0 0 -9.81"/><worldbody>
+  <body><joint name="shoulder" axis="0 1 0" {shoulder}/>
+    <inertial pos="0 0 -.15" mass="1.2" diaginertia=".012 .012 .002"/>
+    <body pos="0 0 -.3"><joint name="elbow" axis="0 1 0" {elbow}/>
+      <inertial pos="0 0 -.12" mass=".7" diaginertia=".006 .006 .001"/>
+</body></body></worldbody><actuator>{own if actuators is None else actuators}</actuator></mujoco>"""
+
+
+def closed_loop(xml, seed=1, duration=16.0, delay=0.0, noise=NOISE):
+    """A recording of commands and positions, and the torque that MuJoCo's actuators gave, (T, 2) [N m]."""
+    model = mujoco.MjModel.from_xml_string(xml)
+    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+    t = np.arange(round(duration / STEP)) * STEP
+    waves = [(rng.uniform(0.1, 0.35), rng.uniform(0.15, 1.6), rng.uniform(0.0, 6.0)) for _ in range(10)]
+    wave = lambda k: sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in waves[5 * k : 5 * k + 5])  # noqa: E731
+    command = np.stack([wave(0), wave(1)], axis=1)
+    late = round(delay / STEP)
+    data.qpos[:], q, torque = command[0], np.empty_like(command), np.empty_like(command)
+    for i in range(len(t)):
+        q[i], data.ctrl[:] = data.qpos, command[max(i - late, 0)]
+        mujoco.mj_step(model, data)
+        torque[i] = data.qfrc_actuator
+    rows = slice(round(0.5 / STEP), None, round(1.0 / RATE / STEP))
+    q = q[rows] + noise * rng.normal(size=q[rows].shape)
+    recording = Recording(
+        t=t[rows], q=q, tau=np.full_like(q, np.nan), qdes=command[rows], joint_names=JOINTS, source=f"run_{seed}.csv"
+    )
+    return recording, torque[rows]
