@@ -104,7 +104,7 @@ def _serve(work: Callable[[Any], None], pipe: Connection) -> None:
     """What a process does: one task after the other, in silence, until nobody asks any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that gave the tasks
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    silence = open(os.devnull, "w")  # noqa: SIM115: for as long as the process lives
+    silence = open(os.devnull, "w")  # noqa: SIM115 - for as long as the process lives
     for stream in (1, 2):
         os.dup2(silence.fileno(), stream)
     with contextlib.redirect_stdout(silence), contextlib.redirect_stderr(silence):

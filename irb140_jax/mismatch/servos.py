@@ -141,6 +141,6 @@ def servo_sentence(recordings: Sequence[Recording]) -> str:
     guessed = [name for name, said in zip(recordings[0].joint_names, drives[0].said, strict=True) if said == "estimate"]
     unit = f"; on {', '.join(guessed)} Kp is estimated, so torque is in units of it" if guessed else ""
     return (
-        f" No torque was logged: it is that of the servos, Kp (qdes - q) - Kd qd{unit}. Names found in such logs are less "
-        "sure than their probabilities say: on real servos several of them were wrong (docs/real-machines.md)."
+        f" No torque was logged: it is that of the servos, Kp (qdes - q) - Kd qd{unit}. Names found in such logs are "
+        "less sure than their probabilities say: on real servos several of them were wrong (docs/real-machines.md)."
     )
