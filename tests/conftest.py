@@ -5,8 +5,13 @@ Many files diagnose arms of the same few sizes; what one worker has compiled the
 
 import atexit
 import os
+import pathlib
 import shutil
 import tempfile
+
+import pytest
+
+MOST_MAPS = 20_000
 
 if "PYTEST_XDIST_WORKER" not in os.environ and "JAX_COMPILATION_CACHE_DIR" not in os.environ:
     folder = tempfile.mkdtemp(prefix="irb140-tests-")
@@ -14,3 +19,14 @@ if "PYTEST_XDIST_WORKER" not in os.environ and "JAX_COMPILATION_CACHE_DIR" not i
     # Of the workers and of the commands that the tests run, too.
     os.environ["JAX_COMPILATION_CACHE_DIR"] = folder
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.05"
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few_compiled_programs():
+    """A process may map 65 530 pieces of memory, and every compiled program takes some: past that LLVM crashes."""
+    yield
+    maps = pathlib.Path("/proc/self/maps")
+    if maps.exists() and len(maps.read_bytes().splitlines()) > MOST_MAPS:
+        import jax
+
+        jax.clear_caches()

@@ -26,7 +26,11 @@ def native_robot(model: CorrectedModel) -> Robot:
     phi = consistent(model.phi_corrected, nominal)
     # A link whose nominal inertials are those of no body, as a point mass's, keeps them.
     phi = np.where(np.array([is_body(p) for p in nominal])[:, None], phi, nominal)
-    return as_named(with_phi(model.robot, jnp.asarray(phi)), model.named)
+    robot = as_named(with_phi(model.robot, jnp.asarray(phi)), model.named)
+    # A payload of a fit's moments need be no body, nor the link that carries it.
+    with_effects = np.asarray(robot.phi)
+    bodies = np.array([is_body(p) or not is_body(old) for p, old in zip(with_effects, nominal, strict=True)])
+    return with_phi(robot, jnp.asarray(np.where(bodies[:, None], with_effects, consistent(with_effects, nominal))))
 
 
 def save_native(model: CorrectedModel, folder: pathlib.Path) -> None:
