@@ -75,7 +75,7 @@ def stub(monkeypatch):
         from irb140_jax.robot import load_robot
 
         robot = load_robot(MODEL)
-        return types.SimpleNamespace(robot=robot, known_joints=robot.joint_names)
+        return types.SimpleNamespace(robot=robot, known_joints=robot.joint_names, drive=None)
 
     for function in (diagnose, save, predict, load_model):
         monkeypatch.setattr(irb140_jax.mismatch, function.__name__, function, raising=False)
