@@ -5,6 +5,8 @@ by less than their encoders can tell.  Taken alone, such a joint would lose its 
 belongs to it.  So the smoother sees all joints together, through the cross-spectra of their positions.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy import signal, special
 from scipy.signal import windows
@@ -171,7 +173,8 @@ def _taper(x: np.ndarray, rate: float) -> np.ndarray:
 
 def spectrum_of(x: np.ndarray, density: float, rate: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Frequencies [Hz], power density of a position, and that of its white noise: as known, or as seen at the top."""
-    f, p = signal.welch(x, rate, window=_taper(x, rate), detrend="linear")
+    window: Any = _taper(x, rate)  # SciPy's signature knows names of windows only
+    f, p = signal.welch(x, rate, window=window, detrend="linear")
     return f, p, max(float(np.median(p[f > 0.6 * f[-1]])), density)
 
 
