@@ -59,6 +59,6 @@ def mean_slopes(t: jax.Array, rate: jax.Array, half: jax.Array) -> jax.Array:
 
     def mean(x):
         at = t + half * (1.0 + NODES[:, None])
-        return 0.5 * WEIGHTS @ jnp.interp(at, t, x)
+        return 0.5 * jnp.asarray(WEIGHTS) @ jnp.interp(at, t, x)
 
     return jax.vmap(mean, in_axes=1, out_axes=1)(rate)
