@@ -32,7 +32,9 @@ def test_it_is_located_by_joint_and_variables_and_not_named(slug):
     case = conceal(str(irb140_path()), [Concealment(slug, (joint,), SHARE)], motions, seed=2)
     diagnosis = diagnose(robot, case.recordings).diagnosis
     assert {(f["effect"], *f["joints"]) for f in diagnosis["findings"]} <= IN_PART.get(slug, set())
-    assert diagnosis["verdict"] == ("physics_left_out" if diagnosis["findings"] else "unexplained")
+    # Where it is a large part of what is left, whether all of it is physics can stay open.
+    allowed = ("physics_left_out",) if diagnosis["findings"] else ("unexplained", "undecided")
+    assert diagnosis["verdict"] in allowed
     (rest,) = diagnosis["unexplained"]
     assert rest["joints"] == [joint]
     assert variables in str(rest)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import interpolate, ndimage
 
 from irb140_jax import dynamics
-from irb140_jax.recordings.direction import REST, direction_of, slow
+from irb140_jax.recordings.direction import REST, direction_of
 from irb140_jax.recordings.drive import DELAY_WIDTH, ROWS_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.recording import Recording
@@ -214,7 +214,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     direction = filtered(direction_of(smoothed[1], smoothed[2], hidden, rest_speed, raw_rate), anti_alias)
     direction = _at(grid, t, direction)
     stuck = _at(grid, recording.t, _within_a_step(recording).astype(float))
-    resting = _widened(np.maximum(_held(slow(qd, qdd, rest_speed, band.rate), band.rate), stuck), band.rate)
+    resting = _widened(np.maximum(_held(np.abs(qd) < rest_speed, band.rate), stuck), band.rate)
     # A gap spoils what the smoother and, later, the low-pass reach from it; half their length holds most of that.
     reach = (int(np.ceil(half / raw_rate * band.rate)) + (len(band.low_pass()) - 1) // 2) // 2
     lost = ndimage.maximum_filter1d((np.interp(grid, t, missing.astype(float)) > 0).astype(int), 2 * reach + 1) > 0

@@ -33,14 +33,14 @@ def direction_of(
         The direction, from -1 to 1, shape (T, n).
     """
     out, sharp = np.tanh(qd / rest_speed), _mean_tanh(qd / noise, np.abs(qdd) / (2.0 * rate * noise))
-    signs = np.where(slow(qd, qdd, rest_speed, rate), 0.0, np.sign(qd))
+    signs = np.where(_slow(qd, qdd, rest_speed, rate), 0.0, np.sign(qd))
     for sign, through, direction in zip(signs.T, sharp.T, out.T, strict=True):
         if sign.any():
             _fill(sign, through, direction, int(REST * rate), int(STICK * rate))
     return out
 
 
-def slow(qd: np.ndarray, qdd: np.ndarray, rest_speed: np.ndarray, rate: float) -> np.ndarray:
+def _slow(qd: np.ndarray, qdd: np.ndarray, rest_speed: np.ndarray, rate: float) -> np.ndarray:
     """Where a joint may be at rest, shape (T, n).
 
     Smoothing rings where a joint sticks or breaks free. A joint that goes through at the acceleration found beside it

@@ -143,7 +143,8 @@ def signal_weights(
     middle = special.chdtri(2 * len(spectra), 0.5) / (2 * len(spectra))
     floor = np.maximum(np.maximum(np.median(own[f > 0.6 * f[-1]], axis=0) / middle, density), 1e-300)
     bins = np.arange(len(f))
-    reach = np.maximum(BINS, (BREADTH * bins).astype(int))
+    # A matrix of several joints takes more periodograms to know than one joint's spectrum.
+    reach = np.maximum(BINS, (BREADTH * bins).astype(int) * (n > 1))
     low, high = np.maximum(bins - reach, 0), np.minimum(bins + reach + 1, len(f))
     total = np.concatenate([np.zeros((1, n, n)), np.cumsum(P, axis=0)])
     smooth = (total[high] - total[low]) / (high - low)[:, None, None]
