@@ -24,7 +24,10 @@ OUTSIDE = {
 IN_PART = {"magnetic_saturation": {("torque_gain", "joint1")}}
 
 
-@pytest.mark.parametrize("slug", OUTSIDE)
+MISSED = pytest.mark.xfail(reason="`undecided`, and not located, since joints are smoothed together", strict=True)
+
+
+@pytest.mark.parametrize("slug", [pytest.param(s, marks=MISSED if s == "rotor_gyroscope" else ()) for s in OUTSIDE])
 def test_it_is_located_by_joint_and_variables_and_not_named(slug):
     joint, variables = OUTSIDE[slug]
     robot = irb140()
@@ -32,9 +35,7 @@ def test_it_is_located_by_joint_and_variables_and_not_named(slug):
     case = conceal(str(irb140_path()), [Concealment(slug, (joint,), SHARE)], motions, seed=2)
     diagnosis = diagnose(robot, case.recordings).diagnosis
     assert {(f["effect"], *f["joints"]) for f in diagnosis["findings"]} <= IN_PART.get(slug, set())
-    # Where it is a large part of what is left, whether all of it is physics can stay open.
-    allowed = ("physics_left_out",) if diagnosis["findings"] else ("unexplained", "undecided")
-    assert diagnosis["verdict"] in allowed
+    assert diagnosis["verdict"] == ("physics_left_out" if diagnosis["findings"] else "unexplained")
     (rest,) = diagnosis["unexplained"]
     assert rest["joints"] == [joint]
     assert variables in str(rest)
