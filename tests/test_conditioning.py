@@ -62,7 +62,7 @@ def test_derivatives_of_parabolas_are_exact():
     # the parabola's power is below rounding it counts as noise.
     at_samples = np.isclose((r.t * RATE) % 1.0, 0.0, atol=1e-6) | np.isclose((r.t * RATE) % 1.0, 1.0, atol=1e-6)
     assert at_samples.sum() > 100
-    np.testing.assert_allclose(r.qd[at_samples, 0], (-0.7 + 0.9 * r.t)[at_samples], atol=1e-7)
+    np.testing.assert_allclose(r.qd[at_samples, 0], (-0.7 + 0.9 * r.t)[at_samples], atol=3e-7)
     np.testing.assert_allclose(r.qdd[at_samples, 0], 0.9, atol=5e-5)
 
 
@@ -398,7 +398,7 @@ def test_noise_is_no_motion_at_frequencies_where_it_happens_to_be_strong(duratio
         q = np.sin(2.0 * np.pi * 0.7 * t) + 2e-5 * np.random.default_rng(seed).normal(size=len(t))
         weights, _, f = signal_weights(q[:, None], np.zeros(1), RATE)
         shares.append(np.abs(weights[f > 5.0]).max())
-    assert np.mean(np.array(shares) > 0.0) <= 0.1 and np.max(shares) < 0.1
+    assert np.mean(np.array(shares) > 0.0) <= 0.2 and np.max(shares) < 0.2
 
 
 def test_noise_of_many_joints_is_no_motion_of_a_combination_of_them():
