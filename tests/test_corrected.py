@@ -197,6 +197,16 @@ def test_mujoco_reproduces_the_prediction_where_everything_can_be_expressed():
     np.testing.assert_allclose(mujoco_torque(native_robot(whole), m), fitted, atol=1e-6 * np.abs(fitted).max())
 
 
+def test_a_payload_whose_moments_are_those_of_no_body_leaves_a_file_that_mujoco_takes():
+    law, n = CATALOGUE["payload"], arm().n
+    w = np.array([3.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.02, 0.0, 0.02])  # its first moment of inertia is negative
+    named = Named(law, tuple(range(n)), tuple(range(10)), w, np.zeros(0))
+    phi, band = np.asarray(arm().phi), Band(20.0, 32.0, 200.0, 4)
+    native = native_robot(CorrectedModel(arm(), phi, phi, (named,), band, np.ones(n)))
+    compiled = mujoco.MjModel.from_xml_string(robot_mjcf(native))
+    assert compiled.body_mass[-1] == pytest.approx(float(arm().phi[-1, 0]) + 3.0, rel=0.5)
+
+
 @pytest.mark.parametrize("slug", SECOND_ORDER)
 def test_mujoco_reproduces_wrong_zeros_and_leaning_bases_to_second_order(slug):
     one, m = model(slug, phi=1.0), motion()

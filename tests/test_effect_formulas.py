@@ -153,6 +153,14 @@ def test_columns_are_the_formula_of_the_contract(effect):
             np.testing.assert_allclose(torque, LAWS[effect.slug](values, *along), rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("slug", ["time_delay", "channel_skew"])
+def test_a_delays_finer_grid_lies_about_the_delay_that_was_found(slug):
+    law = CATALOGUE[slug]
+    grid = np.linspace(-0.016, 0.016, 33)[:, None]
+    finer = law.finer(grid, law.shape_of(np.array([-0.0111]), np.array([-0.0045])))
+    assert finer.mean() == pytest.approx(-0.00555) and np.ptp(finer) == pytest.approx(0.002)
+
+
 @pytest.mark.parametrize("delay", [0.003, 0.0185, -0.031])
 def test_a_delay_that_is_on_the_grid_is_right_up_to_the_highest_frequency(delay):
     t, omega = np.arange(0.0, 2.0, 0.005), 2.0 * np.pi * 20.0

@@ -14,7 +14,7 @@ import irb140_jax.mismatch.store as store
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.model import CorrectedModel, Named
 from irb140_jax.mismatch.motion import not_in_file, proof_in_motion
-from irb140_jax.mismatch.motion.told import lost, sentences
+from irb140_jax.mismatch.motion.sentences import lost, sentences
 from irb140_jax.mismatch.motion.windows import Span, spans, windows
 from irb140_jax.oracle.rollout import positions, simulated_model
 from irb140_jax.recordings.condition import Conditioned

@@ -138,6 +138,20 @@ def test_amplitudes_that_are_not_admissible_make_a_set_impossible():
     assert 0 not in Search(bounded, (SETTING, SETTING)).run()
 
 
+def test_without_a_member_that_held_another_ones_shape_in_place_that_one_takes_another_shape():
+    """Columns 4 and 5 are shapes of one law, at which its amplitude must be large, or may be anything."""
+    space, _ = planted(6, {0: 2.0, 4: 2.0})
+    candidates, lowest = list(space.candidates), space.lowest.copy()
+    for k in (4, 5):
+        candidates[k] = dataclasses.replace(candidates[4], shape=np.array([float(k)]), columns=np.array([k]))
+    lowest[4] = 10.0
+    space = dataclasses.replace(space, candidates=tuple(candidates), lowest=lowest)
+    settings = (SETTING, SETTING)
+    assert space.log_evidence((0, 4), settings) == -np.inf
+    assert space.reshaped((0, 4), settings) == (0, 5) and space.reshaped((0, 5), settings) == (0, 5)
+    assert 4 not in Search(space, settings).run((0, 4))
+
+
 def test_the_prior_of_the_sizes_is_a_probability():
     total = sum(np.exp(log_prior((k, 0, 0, ONE)) - log_prior((0, 0, 0, ONE))) for k in range(len(SIZES)))
     first = 2.0 / np.pi * np.arctan(0.5 * SIZES[1] / 0.03)

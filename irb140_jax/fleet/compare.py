@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from irb140_jax.errors import InputError
-from irb140_jax.fleet.heterogeneity import LEVEL, all_within, cochran, differences, holm, pooled
-from irb140_jax.fleet.sayings import said_of_effect, said_of_parameter
+from irb140_jax.fleet.heterogeneity import LEVEL, Difference, all_within, cochran, differences, holm, pooled
+from irb140_jax.fleet.sentences import said_of_effect, said_of_parameter
 
 SCHEMA = 1  # of compare.json
 ORDER = ("differs", "named_in_some", "cannot_tell", "same")
@@ -123,16 +123,10 @@ def _most_unlike(x: np.ndarray, s: np.ndarray) -> int:
 def _judged(p: Mapping[str, Any], same_within: float) -> str:
     if p["p"] is None:
         return "named_in_some"
-    pairs, margin = _pairs(p), same_within * abs(p["pooled"]["value"])
+    pairs, margin = [Difference(**d) for d in p["differences"]], same_within * abs(p["pooled"]["value"])
     if all_within(pairs, margin):
         return "same"
     return "differs" if p["p_holm"] < LEVEL else "cannot_tell"
-
-
-def _pairs(p: Mapping[str, Any]):
-    from irb140_jax.fleet.heterogeneity import Difference
-
-    return [Difference(**d) for d in p["differences"]]
 
 
 def _effect(given: Sequence[Given], place: Place, parameters: list[dict[str, Any]]) -> dict[str, Any]:

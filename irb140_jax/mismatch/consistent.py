@@ -34,6 +34,17 @@ def consistent(phi: np.ndarray, nominal: np.ndarray) -> np.ndarray:
     return out
 
 
+def of_bodies_or_nominal(phi: np.ndarray, nominal: np.ndarray) -> np.ndarray:
+    """`consistent` parameters; a link whose nominal inertials are those of no body, as a point mass's, keeps those.
+
+    Args:
+        phi: Inertial parameters, shape (n, 10).
+        nominal: Those of the model as given, shape (n, 10).
+    """
+    possible = np.array([is_body(p) for p in nominal])
+    return np.where(possible[:, None], consistent(phi, nominal), nominal)
+
+
 def is_body(phi: np.ndarray) -> bool:
     """Whether inertial parameters (10,) are those of a body with mass along every direction, beyond rounding."""
     values = np.linalg.eigvalsh(pseudo_inertia(phi))

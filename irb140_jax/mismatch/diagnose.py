@@ -171,17 +171,17 @@ def _diagnosed(
     said = [*servo_notes, *open_joints, *unnamed, *coarse, *twice, *again, *usual, *gap]
     every = of_servos(ex, smooth[0].servo, [*found, *torque_scale_finding(robot, ex)])
     diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)
+    diagnosis["summary"] += servo_sentence(recordings)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
-    missing = [not_in_file(model, r, torque) for r, torque in zip(smooth, by_laws, strict=True)]
-    diagnosis["summary"] += servo_sentence(recordings)
-    motion = _motion(robot, ex, proof, refit.loose, band, smooth, recordings, missing)
+    beyond_file = [not_in_file(model, r, torque) for r, torque in zip(smooth, by_laws, strict=True)]
+    motion = _motion(robot, ex, proof, refit.loose, band, smooth, recordings, beyond_file)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said) | {"motion": motion}, open_)
 
 
 def _motion(
     robot: Robot, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], band: Band, smooth: Sequence[Conditioned],
-    recordings: Sequence[Recording], missing: Sequence[np.ndarray],
+    recordings: Sequence[Recording], beyond_file: Sequence[np.ndarray],
 ) -> dict[str, Any] | None:  # fmt: skip
     """The proof in motion; None where a joint's torque was lost or never logged, so that nothing can be simulated."""
     if smooth[0].servo is not None or any(r.torque_lost is not None and r.torque_lost.any() for r in recordings):
@@ -192,7 +192,7 @@ def _motion(
         fold = proof.folds[k]
         return _fitted_model(robot, ex, fold.refit, loose, fold.corrected, fold.scale, band)
 
-    return rounded(proof_in_motion(robot, of_fold, unseen, smooth, missing))
+    return rounded(proof_in_motion(robot, of_fold, unseen, smooth, beyond_file))
 
 
 def _nothing_compared(

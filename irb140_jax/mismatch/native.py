@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.mismatch.consistent import consistent, is_body
+from irb140_jax.mismatch.consistent import consistent, is_body, of_bodies_or_nominal
 from irb140_jax.mismatch.model import CorrectedModel, Named, as_named
 from irb140_jax.oracle.mujoco import inverse_dynamics, oracle_model
 from irb140_jax.recordings.condition import Conditioned
@@ -23,11 +23,9 @@ def native_robot(model: CorrectedModel) -> Robot:
     gear, which holds the torque constants found wrong.
     """
     nominal = np.asarray(model.robot.phi)
-    phi = consistent(model.phi_corrected, nominal)
-    # A link whose nominal inertials are those of no body, as a point mass's, keeps them.
-    phi = np.where(np.array([is_body(p) for p in nominal])[:, None], phi, nominal)
+    phi = of_bodies_or_nominal(model.phi_corrected, nominal)
     robot = as_named(with_phi(model.robot, jnp.asarray(phi)), model.named)
-    # A payload of a fit's moments need be no body, nor the link that carries it.
+    # Mass and moments of a payload are fitted one by one: with it, a link may be no body any more.
     with_effects = np.asarray(robot.phi)
     bodies = np.array([is_body(p) or not is_body(old) for p, old in zip(with_effects, nominal, strict=True)])
     return with_phi(robot, jnp.asarray(np.where(bodies[:, None], with_effects, consistent(with_effects, nominal))))

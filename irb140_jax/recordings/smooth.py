@@ -20,7 +20,7 @@ ENDS = 0.5  # ... from so many periods of the highest frequency in the motion ..
 SHORTEST, LONGEST = 0.1, 1.0  # ... but not less, nor more [s]
 WINDOW = 4.0  # [s] of the spectrum's windows
 BINS = 2  # of the spectrum on either side that are averaged at least ...
-BREADTH = 0.3  # ... and as a share of the frequency: spectra of motion are alike on a logarithmic scale
+BREADTH = 0.3  # ... and, of several joints, as a share of the frequency: a matrix takes more periodograms to know
 FEW = 10  # lowest lines of the spectrum, all signal: noise there is differentiated to next to nothing
 CHANCE = 2.0  # scales of Tracy and Widom's law beyond the edge, which noise alone seldom reaches
 AT_ONCE = 1 << 14  # frequencies
@@ -143,7 +143,6 @@ def signal_weights(
     middle = special.chdtri(2 * len(spectra), 0.5) / (2 * len(spectra))
     floor = np.maximum(np.maximum(np.median(own[f > 0.6 * f[-1]], axis=0) / middle, density), 1e-300)
     bins = np.arange(len(f))
-    # A matrix of several joints takes more periodograms to know than one joint's spectrum.
     reach = np.maximum(BINS, (BREADTH * bins).astype(int) * (n > 1))
     low, high = np.maximum(bins - reach, 0), np.minimum(bins + reach + 1, len(f))
     total = np.concatenate([np.zeros((1, n, n)), np.cumsum(P, axis=0)])

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from irb140_jax.mismatch.consistent import consistent, is_body
+from irb140_jax.mismatch.consistent import of_bodies_or_nominal
 from irb140_jax.mismatch.model import CorrectedModel
 from irb140_jax.mismatch.native import native_robot
 from irb140_jax.oracle.mujoco import inverse_dynamics, mass_matrix, oracle_model
@@ -18,7 +18,6 @@ from irb140_jax.robot import Robot, robot_mjcf, with_phi
 
 ENDLESS = 1e5  # [rad/s^2 or m/s^2] faster, no motor turns anything
 FLYWHEEL = 1e6  # [kg m^2 or kg] rotor of a joint that follows the recording
-MODELS = ("nominal", "refit", "corrected")
 FILE = "file"  # corrected.xml alone, where it can't hold all effects
 
 
@@ -122,7 +121,5 @@ def compiled_robot(robot: Robot, step: float) -> mujoco.MjModel:
 
 def _refitted(model: CorrectedModel) -> Robot:
     """Refitted inertials of possible bodies, in the way of `native_robot`."""
-    nominal = np.asarray(model.robot.phi)
-    phi = consistent(model.phi_refit, nominal)
-    phi = np.where(np.array([is_body(p) for p in nominal])[:, None], phi, nominal)
+    phi = of_bodies_or_nominal(model.phi_refit, np.asarray(model.robot.phi))
     return with_phi(model.robot, jnp.asarray(phi))

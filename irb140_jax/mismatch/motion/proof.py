@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.mismatch.model import CorrectedModel
-from irb140_jax.mismatch.motion.models import FILE, MODELS, Simulated, compiled_robot, leading, led, simulated
-from irb140_jax.mismatch.motion.told import sentences, subject
+from irb140_jax.mismatch.motion.models import FILE, Simulated, compiled_robot, leading, led, simulated
+from irb140_jax.mismatch.motion.sentences import MODELS, sentences, subject
 from irb140_jax.mismatch.motion.windows import FINEST, LONGEST, Span, Window, windows
 from irb140_jax.oracle.rollout import positions, tool_positions
 from irb140_jax.recordings.condition import Conditioned
