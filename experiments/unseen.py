@@ -49,7 +49,7 @@ def unseen_errors(model: CorrectedModel, case: ConcealedCase, noise: Noise) -> d
 def _columns(model: CorrectedModel, case: ConcealedCase) -> tuple[np.ndarray, np.ndarray]:
     """What a joint's torque may be made of along the last recording, shape (T, n, K), each of size 1; and its times."""
     smooth = condition(case.recordings[-1], model.band, pad=True)
-    torques, lib = torques_along(model, smooth), library_of(model)
+    torques, lib = torques_along(model, smooth), library_of(model.robot, model.named)
     along = seen_by(better_known(model.robot, model.phi_corrected, model.named), prepared(model.robot, smooth))
     found = columns_along(lib, along, torques.loads)
     one = np.ones(1)

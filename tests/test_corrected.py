@@ -20,7 +20,7 @@ from irb140_jax.errors import InputError
 from irb140_jax.mismatch import corrected_robot, predict, prediction_times
 from irb140_jax.mismatch.consistent import consistent, pseudo_inertia
 from irb140_jax.mismatch.model import CorrectedModel, Named, from_json, scaled, to_json, torques_along
-from irb140_jax.mismatch.native import NOTES, XML, native_gap, native_robot, save_native
+from irb140_jax.mismatch.native import NOTES, XML, beyond_file, native_gap, native_robot, save_native
 from irb140_jax.mismatch.notes import gap_notes
 from irb140_jax.mismatch.regression.discrepancy import FEATURES, Discrepancy
 from irb140_jax.recordings import Recording, read_recording
@@ -261,17 +261,16 @@ def test_impossible_inertials_become_those_of_a_body_that_mujoco_accepts(seed):
 def test_how_far_the_written_file_is_off_is_what_impossible_inertials_lose():
     m, sound = motion(), model("coulomb_friction", "viscous_friction")
     smooth = as_conditioned(m)
-    along = lambda x: [x.band.apply(torques_along(x, smooth).corrected)]  # noqa: E731
-    gap = native_gap(sound, [smooth], along(sound))
-    size = np.sqrt(np.mean(along(sound)[0] ** 2, axis=0))
-    assert gap is not None and np.all(gap < 1e-6 * size)
+    along = lambda x: [torques_along(x, smooth).corrected]  # noqa: E731
+    gap_of = lambda x: native_gap(beyond_file(x, [smooth], along(x)) or [], x.band)  # noqa: E731
+    gap, size = gap_of(sound), np.sqrt(np.mean(along(sound)[0] ** 2, axis=0))
+    assert np.all(gap < 1e-6 * size)
     wild = sound.phi_corrected * np.array([[1.0], [-1.0]])
     lost = dataclasses.replace(sound, phi_corrected=wild)
     mended = consistent(wild, np.asarray(arm().phi)) - wild
     Y = np.asarray(irb.dynamics.regressor_batch(arm(), *(jnp.asarray(x) for x in (m.q, m.qd, m.qdd))))
     expected = np.sqrt(np.mean(lost.band.apply(Y @ mended.ravel()) ** 2, axis=0))
-    gap = native_gap(lost, [smooth], along(lost))
-    assert gap is not None
+    gap = gap_of(lost)
     np.testing.assert_allclose(gap, expected, rtol=1e-3)
     (note, *_) = gap_notes(arm(), gap, size, [])
     assert "are physically impossible" in note and f"{gap[0]:.3g} N m" in note

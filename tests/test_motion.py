@@ -13,9 +13,10 @@ from scipy.integrate import solve_ivp
 import irb140_jax.mismatch.store as store
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.model import CorrectedModel, Named
-from irb140_jax.mismatch.motion import not_in_file, proof_in_motion
+from irb140_jax.mismatch.motion import proof_in_motion
 from irb140_jax.mismatch.motion.sentences import lost, sentences
 from irb140_jax.mismatch.motion.windows import Span, spans, windows
+from irb140_jax.mismatch.native import beyond_file
 from irb140_jax.oracle.rollout import positions, simulated_model
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
@@ -124,8 +125,8 @@ def test_what_mjcf_cannot_hold_is_applied_as_torque_and_said():
     robot, recording = robot_of(ARM), recorded(viscous=0.0)
     law = recording.tau + np.stack([np.where(recording.qd[:, 0] > 0, 1.0, -3.0), 0.3 * np.sin(recording.t)], axis=1)
     model, recording = model_of(robot, both), dataclasses.replace(recording, tau=law)
-    missing = not_in_file(model, recording, law)  # the sine, which the file does not hold
-    made = proof_in_motion(robot, lambda _: model, [Span(0, 0, 0.0, 5.99)], [recording], [missing])
+    missing = beyond_file(model, [recording], [law])  # the sine, which the file does not hold
+    made = proof_in_motion(robot, lambda _: model, [Span(0, 0, 0.0, 5.99)], [recording], missing or [])
     assert made and made["as_torque"] == ["friction that differs by direction"]
     assert "applied as a torque" in made["sentences"][-1]
     for joint in made["joints"].values():

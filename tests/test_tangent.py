@@ -50,7 +50,7 @@ def found_model(dphi: np.ndarray, amplitudes: list[np.ndarray]) -> CorrectedMode
 
 def settled(model: CorrectedModel):
     """Library, recording and torques of a model, its loads those that it makes itself."""
-    lib, dphi = library_of(model), (model.phi_corrected - np.asarray(ROBOT.phi)).ravel()
+    lib, dphi = library_of(model.robot, model.named), (model.phi_corrected - np.asarray(ROBOT.phi)).ravel()
     along = seen_by(better_known(ROBOT, model.phi_corrected, model.named), prepared(ROBOT, SMOOTH))
     loads = None
     for _ in range(6):  # a gain, a lag and a delay one after the other
@@ -126,7 +126,7 @@ def test_a_spring_that_buckles_under_the_weight_is_no_law_of_this_motion():
     def moved_by(compliance: float, robot) -> np.ndarray:
         spring = Named(CATALOGUE["joint_elasticity"], (1,), (0,), np.ones(1), np.array([compliance]))
         model = CorrectedModel(robot, np.asarray(robot.phi), np.asarray(robot.phi), (spring,), BAND, SMOOTH.rest_speed)
-        return columns_along(library_of(model), prepared(robot, SMOOTH)).effects
+        return columns_along(library_of(model.robot, model.named), prepared(robot, SMOOTH)).effects
 
     heavy = eqx.tree_at(lambda r: r.gravity, ROBOT, 20.0 * ROBOT.gravity)
     assert moved_by(1e-5, heavy).any()

@@ -175,7 +175,6 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
     which = np.array(float(recording))
     whole = Motion(*moving, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
     per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)
-    sites, shapes = [b[1] for b in lib.blocks], [b[2] for b in lib.blocks]
     turns = [turning_points(q) for q in r.q.T]
     out = np.empty((len(r.t), len(lib.entries[0])))
     for start in range(0, max(len(r.t) - RUN_IN, 1), CHUNK - RUN_IN):
@@ -188,8 +187,8 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
 
         motion, run_in = jax.tree.map(piece, whole, per_sample), RUN_IN if start else 0
         motion = dataclasses.replace(motion, turned=turned_before(r.q, turns, start, TURNS))
-        effects = np.asarray(_columns(tuple(b[0] for b in lib.blocks), motion, sites, shapes))
-        out[start + run_in : start + CHUNK] = effects[run_in : CHUNK - pad]
+        effects = [np.zeros((CHUNK, 0)), *(_columns(*program, motion) for program in lib.programs)]
+        out[start + run_in : start + CHUNK] = np.concatenate(effects, axis=1)[run_in : CHUNK - pad]
     return Columns(along.Y, along.nominal, along.motor_side, _bounded(lib, out))
 
 
@@ -209,9 +208,8 @@ def _bounded(lib: Library, effects: np.ndarray) -> np.ndarray:
 
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
 @eqx.filter_jit(compiler_options=QUICK)  # pyright: ignore[reportCallIssue]: passed on to jax.jit, says its docstring
-def _columns(effects, motion, sites, shapes):
-    T = len(motion.t)
-    rows = [jnp.zeros((T, 0))]
+def _columns(effects, sites, shapes, motion):
+    T, rows = len(motion.t), []
     for effect, joints, shape in zip(effects, sites, shapes, strict=True):
         joints, shape = jnp.asarray(joints), jnp.asarray(shape)
         per_shape = jax.vmap(partial(effect.columns, motion), in_axes=(None, 0))

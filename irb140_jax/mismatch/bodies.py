@@ -96,13 +96,10 @@ class _Link:
     def slopes(self, x: np.ndarray) -> np.ndarray:
         U = np.zeros((4, 4))
         U[LOWER] = x
-        out = np.empty((10, 10))
-        for k, at in enumerate(zip(*LOWER, strict=True)):
-            step = np.zeros((4, 4))
-            step[at] = 1.0
-            turned = self.root @ (step @ U.T + U @ step.T) @ self.root.T
-            out[:, k] = self.inverse @ parameters(turned)
-        return out
+        half = STEPS @ U.T
+        turned = self.root @ (half + np.swapaxes(half, 1, 2)) @ self.root.T
+        return self.inverse @ parameters(turned).T
 
 
 LOWER = np.tril_indices(4)
+STEPS = np.eye(16).reshape(4, 4, 4, 4)[LOWER]  # unit steps of each element of a lower triangle

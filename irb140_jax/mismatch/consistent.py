@@ -52,18 +52,27 @@ def is_body(phi: np.ndarray) -> bool:
 
 
 def pseudo_inertia(phi: np.ndarray) -> np.ndarray:
-    """[[Sigma, h], [h', m]] with Sigma = tr(I)/2 - I, of one link about its frame, shape (4, 4)."""
-    inertia = np.zeros((3, 3))
-    inertia[np.triu_indices(3)] = phi[4:]
-    inertia = inertia + np.triu(inertia, 1).T
-    J = np.zeros((4, 4))
-    J[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    J[:3, 3] = J[3, :3] = phi[1:4]
-    J[3, 3] = phi[0]
-    return J
+    """[[Sigma, h], [h', m]] with Sigma = tr(I)/2 - I, of one link or more about its frame, shape (..., 4, 4)."""
+    return np.tensordot(phi, _OF_PARAMETERS, 1)
 
 
 def parameters(J: np.ndarray) -> np.ndarray:
-    """The inverse of `pseudo_inertia`."""
-    inertia = np.trace(J[:3, :3]) * np.eye(3) - J[:3, :3]
-    return np.concatenate([[J[3, 3]], J[:3, 3], inertia[np.triu_indices(3)]])
+    """The inverse of `pseudo_inertia`, shape (..., 10)."""
+    return J.reshape(*J.shape[:-2], 16) @ _TO_PARAMETERS
+
+
+def _unit_pseudo_inertias() -> np.ndarray:
+    """Pseudo-inertia of every inertial parameter alone, shape (10, 4, 4)."""
+    unit = np.zeros((10, 4, 4))
+    unit[0, 3, 3] = 1.0
+    for k in range(3):
+        unit[1 + k, k, 3] = unit[1 + k, 3, k] = 1.0
+    for k, (i, j) in enumerate(zip(*np.triu_indices(3), strict=True)):
+        inertia = np.zeros((3, 3))
+        inertia[i, j] = inertia[j, i] = 1.0
+        unit[4 + k, :3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    return unit
+
+
+_OF_PARAMETERS = _unit_pseudo_inertias()
+_TO_PARAMETERS = np.linalg.pinv(_OF_PARAMETERS.reshape(10, 16))

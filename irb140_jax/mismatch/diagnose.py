@@ -27,9 +27,9 @@ from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, fitted
 from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding, torque_scale_odds
 from irb140_jax.mismatch.model import CorrectedModel, Named, scaled, torques_along
-from irb140_jax.mismatch.motion import not_in_file, proof_in_motion
+from irb140_jax.mismatch.motion import proof_in_motion
 from irb140_jax.mismatch.motion.windows import spans
-from irb140_jax.mismatch.native import native_gap
+from irb140_jax.mismatch.native import beyond_file, native_gap
 from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, notes
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, recordings_of_blocks, refitted
 from irb140_jax.mismatch.provenance import provenance
@@ -158,7 +158,9 @@ def _diagnosed(
         model, harmful = with_useful_discrepancy(model, smooth, corrected)
         servo_notes += harmful
     lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
-    gap = gap_notes(robot, native_gap(model, smooth, corrected), torque_size(proof, logged), lacking)
+    beyond = beyond_file(model, smooth, by_laws)
+    gap = None if beyond is None else native_gap(beyond, band)
+    gap = gap_notes(robot, gap, torque_size(proof, logged), lacking)
     matters = reference(ex.lib, ex.scales, band.rate)
     seen = visibility(ex, matters)
     usual = notes(robot, smooth, band, config.inertial_uncertainty, usable_rows(smooth, band), proof.judged)
@@ -174,17 +176,17 @@ def _diagnosed(
     diagnosis["summary"] += servo_sentence(recordings)
     open_ = undecided(ex, found, seen, matters, band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
-    beyond_file = [not_in_file(model, r, torque) for r, torque in zip(smooth, by_laws, strict=True)]
-    motion = _motion(robot, ex, proof, refit.loose, band, smooth, recordings, beyond_file)
+    motion = _motion(robot, ex, proof, refit.loose, band, smooth, recordings, beyond)
     return Result(diagnosis, model, _views(robot, ex, proof, recordings, said) | {"motion": motion}, open_)
 
 
 def _motion(
     robot: Robot, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], band: Band, smooth: Sequence[Conditioned],
-    recordings: Sequence[Recording], beyond_file: Sequence[np.ndarray],
+    recordings: Sequence[Recording], beyond: Sequence[np.ndarray] | None,
 ) -> dict[str, Any] | None:  # fmt: skip
     """The proof in motion; None where a joint's torque was lost or never logged, so that nothing can be simulated."""
-    if smooth[0].servo is not None or any(r.torque_lost is not None and r.torque_lost.any() for r in recordings):
+    lost = any(r.torque_lost is not None and r.torque_lost.any() for r in recordings)
+    if beyond is None or lost or smooth[0].servo is not None:
         return None
     unseen = spans([fold.blocks for fold in proof.folds], recordings_of_blocks(ex), [s.t for s in ex.data.stretches])
 
@@ -192,7 +194,7 @@ def _motion(
         fold = proof.folds[k]
         return _fitted_model(robot, ex, fold.refit, loose, fold.corrected, fold.scale, band)
 
-    return rounded(proof_in_motion(robot, of_fold, unseen, smooth, beyond_file))
+    return rounded(proof_in_motion(robot, of_fold, unseen, smooth, beyond))
 
 
 def _nothing_compared(

@@ -10,7 +10,7 @@ from irb140_jax.mismatch.along import Loads, Prepared, columns_along, prepared, 
 from irb140_jax.mismatch.assemble import BLOCKS, assemble
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.explanation import Explanation, fitted, parts
-from irb140_jax.mismatch.model import Named, Torques, better_known, composed
+from irb140_jax.mismatch.model import Named, Torques, better_known, composed, library_of
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.nuisances import nuisances
@@ -89,7 +89,7 @@ def explain(
         physics = _physics(found)
         better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
         along, at = [seen_by(better, r) for r in along], point(robot, found[0], physics)
-        torques = [_torques(lib, found, r, i) for i, r in enumerate(along)]
+        torques = [_torques(robot, physics, found[0], r, i) for i, r in enumerate(along)]
         loads = [t.loads for t in torques]
         off = _off(ex, torques, band)
         noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
@@ -109,12 +109,11 @@ def _physics(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> lis
     return [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
 
 
-def _torques(
-    lib: Library, found: tuple[np.ndarray, list[Candidate], list[np.ndarray]], r: Prepared, index: int
-) -> Torques:
-    """Torques of an explanation (see `fitted`) along a recording."""
-    dphi, members, amplitudes = found
-    return composed(lib, columns_along(lib, r, recording=index), members, amplitudes, dphi, dphi)
+def _torques(robot: Robot, physics: Sequence[Named], dphi: np.ndarray, r: Prepared, index: int) -> Torques:
+    """Torques of effects and of shifted inertial parameters (10 n,) along a recording."""
+    lib = library_of(robot, physics)
+    columns = columns_along(lib, r, recording=index)
+    return composed(lib, columns, lib.candidates, [named.amplitudes for named in physics], dphi, dphi)
 
 
 def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:

@@ -177,10 +177,10 @@ def composed(
     return Torques(nominal, nominal + Y @ dphi_refit, Loads(load, total, load - inside, scaled, asked), corrected)
 
 
-def library_of(model: CorrectedModel) -> Library:
-    """A library of nothing but what the model names, in its order."""
+def library_of(robot: Robot, effects: Sequence[Named]) -> Library:
+    """A library of nothing but these effects, in their order."""
     blocks, candidates, first = [], [], 0
-    for named in model.named:
+    for named in effects:
         width = max(max(v) for v in named.effect.variants) + 1
         blocks.append((named.effect, np.array([named.joints]), named.shape[None, None, :], first))
         candidates.append(
@@ -188,12 +188,12 @@ def library_of(model: CorrectedModel) -> Library:
                       np.full(len(named.variant), -np.inf), np.full(len(named.variant), np.inf))
         )  # fmt: skip
         first += width
-    return Library(model.robot, tuple(candidates), tuple(blocks), first)
+    return Library(robot, tuple(candidates), tuple(blocks), first, apart=True)
 
 
 def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     """The model's torques along a conditioned recording, on its grid."""
-    lib = library_of(model)
+    lib = library_of(model.robot, model.named)
     nominal_phi = np.asarray(model.robot.phi)
     shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
     amplitudes = [named.amplitudes for named in model.named]

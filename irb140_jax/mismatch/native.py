@@ -8,11 +8,11 @@ import numpy as np
 
 from irb140_jax.mismatch.consistent import consistent, is_body, of_bodies_or_nominal
 from irb140_jax.mismatch.model import CorrectedModel, Named, as_named
-from irb140_jax.oracle.mujoco import inverse_dynamics, oracle_model
+from irb140_jax.oracle.mujoco import inverse_dynamics_along, oracle_model
 from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
 
-MOST = 1000  # samples of a recording along which the file is compared: 5 s at the working rate
 XML, NOTES = "corrected.xml", "corrected.md"
 
 
@@ -37,33 +37,34 @@ def save_native(model: CorrectedModel, folder: pathlib.Path) -> None:
     (folder / NOTES).write_text(_page(model), encoding="utf-8")
 
 
-def native_gap(
-    model: CorrectedModel, smooth: Sequence[Conditioned], corrected: Sequence[np.ndarray]
-) -> np.ndarray | None:
-    """What `corrected.xml` gives other than the corrected model along the recordings, root mean square (n,) [N m or N].
+def beyond_file(
+    model: CorrectedModel, recordings: Sequence[Conditioned], torques: Sequence[np.ndarray]
+) -> list[np.ndarray] | None:
+    """What `corrected.xml` lacks of the corrected model's torque along recordings, each (T, n) [N m or N].
 
-    By MuJoCo's own inverse dynamics of the text that is written, through the same low-pass.
+    By MuJoCo's own inverse dynamics of the text that is written.
 
     Args:
         model: The corrected model.
-        smooth: The conditioned recordings.
-        corrected: Its low-passed torque along each, (R, n).
+        recordings: Conditioned.
+        torques: Of the corrected model along each, as the controller logs them, (T, n).
 
     Returns:
-        The difference; None where MuJoCo has other joints than the model.
+        The difference along each; None where MuJoCo has other joints than the model.
     """
-    native = oracle_model(robot_mjcf(native_robot(model)))
+    robot = native_robot(model)
+    native = oracle_model(robot_mjcf(robot))
     if native.nv != model.robot.n:
         return None
-    gear = np.asarray(model.robot.gear) / native.actuator_gear[:, 0] if native.nu == native.nv else 1.0
-    square, rows = np.zeros(native.nv), 0
-    for r, torque in zip(smooth, corrected, strict=True):
-        moving = zip(r.q[:MOST], r.qd[:MOST], r.qdd[:MOST], strict=True)
-        own = np.array([inverse_dynamics(native, *x) for x in moving])
-        own = model.band.apply((own + native.dof_frictionloss * r.direction[:MOST]) * gear)
-        square += np.sum((own - torque[: len(own)]) ** 2, axis=0)
-        rows += len(own)
-    return np.sqrt(square / max(rows, 1))
+    gear = np.asarray(model.robot.gear) / np.asarray(robot.gear)
+    rigid = [inverse_dynamics_along(native, r.q, r.qd, r.qdd) for r in recordings]
+    whole = [tau + native.dof_frictionloss * r.direction for tau, r in zip(rigid, recordings, strict=True)]
+    return [torque - tau * gear for torque, tau in zip(torques, whole, strict=True)]
+
+
+def native_gap(beyond: Sequence[np.ndarray], band: Band) -> np.ndarray:
+    """Root mean square (n,) [N m or N] of what the file lacks along recordings, within the comparison's band."""
+    return np.sqrt(np.mean(np.concatenate([band.apply(x) for x in beyond]) ** 2, axis=0))
 
 
 def _page(model: CorrectedModel) -> str:

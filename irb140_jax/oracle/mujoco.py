@@ -1,4 +1,4 @@
-"""MuJoCo's C engine as an oracle: NumPy in, NumPy out, one sample at a time.
+"""MuJoCo's C engine as an oracle: NumPy in, NumPy out.
 
 Rigid body, armature, damping and springs are in.  Constraints (dry friction, joint limits, contacts) are out, because
 MuJoCo softens them: `frictionloss` must be compared apart.
@@ -47,6 +47,18 @@ def inverse_dynamics(model: mujoco.MjModel, q: Vector, qd: Vector, qdd: Vector) 
     data.qacc[:] = qdd
     mujoco.mj_inverse(model, data)
     return data.qfrc_inverse.copy()
+
+
+def inverse_dynamics_along(
+    model: mujoco.MjModel, q: Float[np.ndarray, "T n"], qd: Float[np.ndarray, "T n"], qdd: Float[np.ndarray, "T n"]
+) -> Float[np.ndarray, "T n"]:
+    """Joint torques of a motion of T samples, `mj_inverse` [N m or N]; see `inverse_dynamics`."""
+    data, out = mujoco.MjData(model), np.empty(np.shape(qdd))
+    for i, row in enumerate(zip(q, qd, qdd, strict=True)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = row
+        mujoco.mj_inverse(model, data)
+        out[i] = data.qfrc_inverse
+    return out
 
 
 def forward_dynamics(model: mujoco.MjModel, q: Vector, qd: Vector, tau: Vector) -> Vector:

@@ -2,7 +2,8 @@
 
 What one joint does moves the others: an arm that sticks and breaks free at one joint shakes all of them, most of them
 by less than their encoders can tell.  Taken alone, such a joint would lose its part of the motion, and the torque that
-belongs to it.  So the smoother sees all joints together, through the cross-spectra of their positions.
+belongs to it.  So what each joint's own spectrum does not keep is smoothed once more, all joints together, through the
+cross-spectra of their positions.
 """
 
 from typing import Any
@@ -20,7 +21,7 @@ ENDS = 0.5  # ... from so many periods of the highest frequency in the motion ..
 SHORTEST, LONGEST = 0.1, 1.0  # ... but not less, nor more [s]
 WINDOW = 4.0  # [s] of the spectrum's windows
 BINS = 2  # of the spectrum on either side that are averaged at least ...
-BREADTH = 0.3  # ... and, of several joints, as a share of the frequency: a matrix takes more periodograms to know
+BREADTH = 0.3  # ... and, of all joints together, as a share of the frequency: a matrix takes more lines to know
 FEW = 10  # lowest lines of the spectrum, all signal: noise there is differentiated to next to nothing
 CHANCE = 2.0  # scales of Tracy and Widom's law beyond the edge, which noise alone seldom reaches
 AT_ONCE = 1 << 14  # frequencies
@@ -115,10 +116,7 @@ def _acceleration(x: np.ndarray, rate: float) -> float:
 def signal_weights(
     q: np.ndarray, density: np.ndarray, rate: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """Weights of Wiener's smoother for all joints together.
-
-    In units of their noise, cross-spectra of noise alone have eigenvalues near one, and those that stand out belong to
-    combinations of joints that move.  Of each the smoother keeps 1 - edge / eigenvalue.
+    """Weights of Wiener's smoother: first each joint's own, then all joints' together for what those took away.
 
     Args:
         q: Positions on an even grid, shape (T, n).
@@ -128,9 +126,6 @@ def signal_weights(
     Returns:
         Weights of each joint's spectrum in each one's signal, shape (F, n, n); density of each joint's noise, shape
         (n,); frequencies [Hz], shape (F,).
-
-    Source: the edge: I. M. Johnstone, On the distribution of the largest eigenvalue in principal components analysis,
-    Annals of Statistics 29(2), 2001.
     """
     n, length, window = q.shape[1], _window(q, rate), _taper(q, rate)
     starts = range(0, len(q) - length + 1, max(length - length // 2, 1))
@@ -142,23 +137,43 @@ def signal_weights(
     # An average of so many periodograms has a median below its mean.
     middle = special.chdtri(2 * len(spectra), 0.5) / (2 * len(spectra))
     floor = np.maximum(np.maximum(np.median(own[f > 0.6 * f[-1]], axis=0) / middle, density), 1e-300)
-    bins = np.arange(len(f))
-    reach = np.maximum(BINS, (BREADTH * bins).astype(int) * (n > 1))
-    low, high = np.maximum(bins - reach, 0), np.minimum(bins + reach + 1, len(f))
-    total = np.concatenate([np.zeros((1, n, n)), np.cumsum(P, axis=0)])
-    smooth = (total[high] - total[low]) / (high - low)[:, None, None]
-    values, vectors = np.linalg.eigh(smooth / np.sqrt(floor[:, None] * floor))
-    values = np.maximum(values, ROUNDING * values[:, -1:])
-    # How many periodograms' worth each average is; the windows' taper widens a line to several bins.
-    width = length * np.sum(window**2) / np.sum(window) ** 2
-    count = np.maximum((high - low) / width, 1.0)[:, None] * len(spectra)
-    edge = (np.sqrt(count) + np.sqrt(n)) ** 2 / count
-    spread = (np.sqrt(count) + np.sqrt(n)) / count * (1.0 / np.sqrt(count) + 1.0 / np.sqrt(n)) ** (1.0 / 3.0)
-    share = np.clip(1.0 - (edge + CHANCE * spread) / np.maximum(values, 1e-300), 0.0, 1.0)
-    weights = np.einsum("fik,fk,fjk->fij", vectors, share, vectors.conj())
-    weights = np.sqrt(floor)[:, None] * weights / np.sqrt(floor)
+    whitened = P / np.sqrt(floor[:, None] * floor)
+    # How many periodograms' worth a line is: the window's taper widens it to several bins.
+    count = len(spectra) * np.sum(window) ** 2 / (length * np.sum(window**2))
+    alone = np.zeros_like(P)
+    for j in range(n):
+        alone[:, j, j] = _kept(whitened[:, j, j][:, None, None], count, 0.0)[:, 0, 0]
+    together = np.sqrt(floor)[:, None] * _kept(whitened, count, BREADTH) / np.sqrt(floor)
+    weights = alone + (np.eye(n) - alone) @ together
     weights[:FEW] = np.eye(n)
     return weights, floor, f
+
+
+def _kept(P: np.ndarray, count: float, breadth: float) -> np.ndarray:
+    """What of spectra in units of their noise is signal, as weights of shape (F, k, k).
+
+    Cross-spectra of noise alone have eigenvalues near one, and those that stand out belong to combinations of joints
+    that move.  Of each 1 - edge / eigenvalue is kept.
+
+    Args:
+        P: Cross-spectra, shape (F, k, k).
+        count: Periodograms that each line is worth.
+        breadth: Share of the frequency over which lines are averaged, at least `BINS` on either side.
+
+    Source: the edge: I. M. Johnstone, On the distribution of the largest eigenvalue in principal components analysis,
+    Annals of Statistics 29(2), 2001.
+    """
+    n, bins = P.shape[1], np.arange(len(P))
+    reach = np.maximum(BINS, (breadth * bins).astype(int))
+    low, high = np.maximum(bins - reach, 0), np.minimum(bins + reach + 1, len(P))
+    total = np.concatenate([np.zeros((1, n, n)), np.cumsum(P, axis=0)])
+    values, vectors = np.linalg.eigh((total[high] - total[low]) / (high - low)[:, None, None])
+    values = np.maximum(values, ROUNDING * values[:, -1:])
+    N = count * (high - low)[:, None]
+    edge = (np.sqrt(N) + np.sqrt(n)) ** 2 / N
+    spread = (np.sqrt(N) + np.sqrt(n)) / N * (1.0 / np.sqrt(N) + 1.0 / np.sqrt(n)) ** (1.0 / 3.0)
+    share = np.clip(1.0 - (edge + CHANCE * spread) / np.maximum(values, 1e-300), 0.0, 1.0)
+    return np.einsum("fik,fk,fjk->fij", vectors, share, vectors.conj())
 
 
 def _window(x: np.ndarray, rate: float) -> int:

@@ -1,4 +1,3 @@
 """Proof in motion: simulated from recorded torque, does the corrected model move as the robot did?"""
 
-from irb140_jax.mismatch.motion.models import not_in_file as not_in_file
 from irb140_jax.mismatch.motion.proof import proof_in_motion as proof_in_motion

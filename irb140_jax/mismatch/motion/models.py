@@ -11,7 +11,7 @@ import numpy as np
 from irb140_jax.mismatch.consistent import of_bodies_or_nominal
 from irb140_jax.mismatch.model import CorrectedModel
 from irb140_jax.mismatch.native import native_robot
-from irb140_jax.oracle.mujoco import inverse_dynamics, mass_matrix, oracle_model
+from irb140_jax.oracle.mujoco import mass_matrix
 from irb140_jax.oracle.rollout import simulated_model
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
@@ -48,29 +48,11 @@ class Simulated:
         Args:
             name: Of the model.
             tau: What was logged, (T, n) [N m or N].
-            missing: What of it corrected.xml can't hold (see `not_in_file`), (T, n) [N m or N].
+            missing: What of it corrected.xml can't hold, (T, n) [N m or N].
         """
         if name in ("nominal", "refit"):
             return tau
         return (tau if name == FILE else tau - missing) * self.gear
-
-
-def not_in_file(model: CorrectedModel, recording: Conditioned, corrected: np.ndarray) -> np.ndarray:
-    """What the named laws add along a recorded motion to the torque of corrected.xml, (T, n) [N m or N].
-
-    Args:
-        model: The corrected model.
-        recording: The motion.
-        corrected: Torque of the laws along it, (T, n) [N m or N].
-    """
-    if not any(named.effect.not_in_mjcf for named in model.named):
-        return np.zeros_like(corrected)
-    robot = native_robot(model)
-    native = oracle_model(robot_mjcf(robot))
-    gear = np.asarray(robot.gear) / np.asarray(model.robot.gear)
-    moving = zip(recording.q, recording.qd, recording.qdd, strict=True)
-    own = np.array([inverse_dynamics(native, *x) for x in moving]) + native.dof_frictionloss * recording.direction
-    return corrected - own / gear
 
 
 def simulated(model: CorrectedModel, nominal: mujoco.MjModel, step: float) -> Simulated | None:

@@ -29,7 +29,7 @@ def proof_in_motion(
         of_fold: The corrected model that has not seen a fold.
         unseen: What each fold leaves out.
         recordings: The conditioned recordings.
-        missing: What corrected.xml can't hold along each, from `not_in_file` [N m or N].
+        missing: What corrected.xml can't hold along each, from `beyond_file` [N m or N].
 
     Returns:
         Errors of each model by joint and at the tool; None where nothing can be simulated.
