@@ -189,7 +189,7 @@ def test_an_effect_that_names_no_history_looks_at_the_present_only(effect):
     whole = effect.columns(m, joints, shape)
     alone = jnp.concatenate([effect.columns(row(k), joints, shape) for k in (0, 7, 59)])
     same = np.allclose(alone, whole[jnp.array([0, 7, 59])], rtol=1e-12, atol=1e-12)
-    by_rates = effect.slug in ("actuator_lag", "time_delay", "channel_skew")  # a motion gives those beside the load
+    by_rates = effect.slug == "actuator_lag"  # a motion gives those beside the load
     assert same == (effect.history is None or by_rates)
 
 

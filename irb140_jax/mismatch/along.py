@@ -187,7 +187,8 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
 
         motion, run_in = jax.tree.map(piece, whole, per_sample), RUN_IN if start else 0
         motion = dataclasses.replace(motion, turned=turned_before(r.q, turns, start, TURNS))
-        effects = [np.zeros((CHUNK, 0)), *(_columns(*program, motion) for program in lib.programs)]
+        # One program for each effect: of all in one, XLA would evaluate parts again and again.
+        effects = [np.zeros((CHUNK, 0)), *(_columns(b[0], b[1], b[2], motion) for b in lib.blocks)]
         out[start + run_in : start + CHUNK] = np.concatenate(effects, axis=1)[run_in : CHUNK - pad]
     return Columns(along.Y, along.nominal, along.motor_side, _bounded(lib, out))
 
@@ -208,14 +209,10 @@ def _bounded(lib: Library, effects: np.ndarray) -> np.ndarray:
 
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
 @eqx.filter_jit(compiler_options=QUICK)  # pyright: ignore[reportCallIssue]: passed on to jax.jit, says its docstring
-def _columns(effects, sites, shapes, motion):
-    T, rows = len(motion.t), []
-    for effect, joints, shape in zip(effects, sites, shapes, strict=True):
-        joints, shape = jnp.asarray(joints), jnp.asarray(shape)
-        per_shape = jax.vmap(partial(effect.columns, motion), in_axes=(None, 0))
-        c = jax.vmap(per_shape)(joints, shape)  # (S, G, T, m, k)
-        rows.append(jnp.moveaxis(c, 2, 0).reshape(T, -1))
-    return jnp.concatenate(rows, axis=-1)
+def _columns(effect, sites, shapes, motion):
+    per_shape = jax.vmap(partial(effect.columns, motion), in_axes=(None, 0))
+    c = jax.vmap(per_shape)(jnp.asarray(sites), jnp.asarray(shapes))  # (S, G, T, m, k)
+    return jnp.moveaxis(c, 2, 0).reshape(len(motion.t), -1)
 
 
 def _friction(robot: Robot, r: Conditioned) -> np.ndarray:

@@ -50,20 +50,12 @@ class Library:
         candidates: What may be left out.
         blocks: (effect, sites (S, m), shapes (S, G, s), first column) of each effect, in the order of the columns.
         size: Number of amplitudes.
-        apart: Whether the columns of each block are a program of its own, which every set of blocks can use.
     """
 
     robot: Robot
     candidates: tuple[Candidate, ...]
     blocks: tuple[tuple[AbstractEffect, np.ndarray, np.ndarray, int], ...]
     size: int
-    apart: bool = False
-
-    @property
-    def programs(self) -> list[tuple[tuple[AbstractEffect, ...], list[np.ndarray], list[np.ndarray]]]:
-        """Effects, sites and shapes of the blocks that are evaluated together."""
-        groups = [[b] for b in self.blocks] if self.apart else [self.blocks]
-        return [(tuple(b[0] for b in g), [b[1] for b in g], [b[2] for b in g]) for g in groups]
 
     @cached_property
     def entries(self) -> tuple[np.ndarray, np.ndarray]:

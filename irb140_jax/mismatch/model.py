@@ -188,7 +188,7 @@ def library_of(robot: Robot, effects: Sequence[Named]) -> Library:
                       np.full(len(named.variant), -np.inf), np.full(len(named.variant), np.inf))
         )  # fmt: skip
         first += width
-    return Library(robot, tuple(candidates), tuple(blocks), first, apart=True)
+    return Library(robot, tuple(candidates), tuple(blocks), first)
 
 
 def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
