@@ -7,7 +7,7 @@ from scipy import linalg, optimize
 
 from irb140_jax.mismatch.consistent import LEAST, parameters, pseudo_inertia
 
-TRIALS = 100  # evaluations of the search; a dozen are usual
+TRIALS = 300  # evaluations of the search; thirty are usual, and more where many bounds are met
 
 
 def of_bodies(
@@ -42,7 +42,8 @@ def of_bodies(
     each = lambda x: zip(free, x.reshape(-1, 10), strict=True)  # noqa: E731
     off = lambda x: np.concatenate([link.errors(v) for link, v in each(x)]) - errors[rows]  # noqa: E731
     slope = lambda x: whiten @ linalg.block_diag(*(link.slopes(v) for link, v in each(x)))  # noqa: E731
-    start = np.concatenate([link.start(errors[link.rows]) for link in free])
+    # From the nominal bodies: from the bounds of the impossible mean the search may stay far from the best.
+    start = np.tile(np.sqrt(1.0 - LEAST) * np.eye(4)[LOWER], len(free))
     best = optimize.least_squares(
         lambda x: whiten @ off(x), start, slope, method="lm", max_nfev=TRIALS  # pyright: ignore[reportArgumentType]
     ).x
@@ -81,11 +82,6 @@ class _Link:
 
     def impossible(self, errors: np.ndarray) -> bool:
         return bool(np.linalg.eigvalsh(self._relative(errors))[0] < LEAST * (1.0 - 1e-6))
-
-    def start(self, errors: np.ndarray) -> np.ndarray:
-        values, vectors = np.linalg.eigh(self._relative(errors))
-        rest = np.maximum(values - LEAST, LEAST)
-        return np.linalg.cholesky((vectors * rest) @ vectors.T)[LOWER]
 
     def errors(self, x: np.ndarray) -> np.ndarray:
         U = np.zeros((4, 4))
