@@ -18,7 +18,7 @@ from irb140_jax.effects import Scales
 from irb140_jax.recordings.condition import Conditioned
 
 TRAVEL = (2e-4, 8e-4, 3e-3, 1.2e-2)  # of a joint's range: over which bristles turn round
-ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which friction approaches its level, slowly at the end
+ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which friction nears its level, slowly at the end
 LATE = (-0.01, -0.005, 0.005, 0.01, 0.02)  # s by which friction turns before or after the joint
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
@@ -97,7 +97,7 @@ def reversal_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) 
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
     base = [_relaxed(q, share * travel) - direction for share in TRAVEL]
-    base += [direction - np.arctan(qd / (share * scales.speed[j])) * 2.0 / np.pi for share in ROUNDED]
+    base += [direction - qd / np.hypot(qd, share * scales.speed[j]) for share in ROUNDED]
     rest = float(scales.rest_speed[j])
     base += [np.tanh((qd + late * qdd) / rest) - direction for late in LATE]
     X = np.stack(base, axis=1)
