@@ -6,7 +6,7 @@ import helpers_recordings as made
 import numpy as np
 import pytest
 
-from irb140_jax.mismatch.sensor_noise import coarse_positions, scatter_by_sensor, sensor_scatter
+from irb140_jax.mismatch.sensor_noise import coarse_positions, scatter_by_sensor
 from irb140_jax.mismatch.sufficient_data import comparable
 from irb140_jax.recordings.condition import choose_band, condition
 from irb140_jax.recordings.low_pass import Band, kernels
@@ -28,7 +28,7 @@ def test_encoder_noise_counts_where_torque_is_exact():
         dataclasses.replace(r, q=r.q + std * np.random.default_rng(0).normal(size=r.q.shape))
         for std, r in ((3e-4, made.recording(noise=0.0, speeds=False)), (0.0, made.recording(noise=0.0, speeds=False)))
     )
-    loud, quiet = (sensor_scatter(made.robot(), [r], [condition(r, BAND)], BAND) for r in (rough, fine))
+    loud, quiet = (np.hypot(*scatter_by_sensor(made.robot(), [r], [condition(r, BAND)], BAND)) for r in (rough, fine))
     assert np.all(loud > 3.0 * quiet)
 
 
@@ -46,4 +46,4 @@ def test_positions_that_limit_the_comparison_are_said(step, said):
 def test_the_band_of_a_recording_leaves_its_scatter_finite():
     recording = made.recording(duration=5.0, speeds=False)
     band = choose_band([recording], made.robot())
-    assert np.isfinite(sensor_scatter(made.robot(), [recording], [condition(recording, band)], band)).all()
+    assert np.isfinite(scatter_by_sensor(made.robot(), [recording], [condition(recording, band)], band)).all()

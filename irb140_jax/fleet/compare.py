@@ -135,7 +135,7 @@ def _effect(given: Sequence[Given], place: Place, parameters: list[dict[str, Any
     said = [p["says"] for p in parameters] or ["cannot_tell"]
     says = min([*said, *(["named_in_some"] if len(named) < len(given) else [])], key=ORDER.index)
     without = [{"of": k, "why": _why_not(given[k], place)} for k in range(len(given)) if k not in named]
-    sentence = said_of_effect(place, named, without, [one.name for one in given])
+    sentence = said_of_effect(named, without, [one.name for one in given])
     return {"effect": place[0], "joints": list(place[1]), "says": says, "named_in": named, "not_named_in": without,
             "sentence": sentence, "parameters": parameters}  # fmt: skip
 

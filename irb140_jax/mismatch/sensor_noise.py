@@ -20,21 +20,14 @@ COARSE = 3.0  # times the noise of the torque sensors: encoder noise above it is
 _masses = eqx.filter_jit(jax.vmap(dynamics.mass_matrix, in_axes=(None, 0)))
 
 
-def sensor_scatter(
-    robot: Robot, recordings: Sequence[Recording], smooth: Sequence[Conditioned], band: Band
-) -> np.ndarray:
-    """Standard deviation that torque and position sensors leave in the comparison, shape (n,) [N m or N].
-
-    Torque noise as it is seen above the motion's frequencies, and encoder noise in the accelerations times the mass
-    matrix.
-    """
-    return np.hypot(*scatter_by_sensor(robot, recordings, smooth, band))
-
-
 def scatter_by_sensor(
     robot: Robot, recordings: Sequence[Recording], smooth: Sequence[Conditioned], band: Band
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The parts of `sensor_scatter` that come from the torque sensors and from the encoders, shape (n,) each."""
+    """Standard deviations that torque sensors and encoders leave in the comparison, shape (n,) each [N m or N].
+
+    Torque noise is measured above the frequencies of the motion; encoder noise in the accelerations is multiplied by
+    the mass matrix.  Both are independent, so their squares add.
+    """
     by_torque, by_encoder = [], []
     for raw, r in zip(recordings, smooth, strict=True):
         poses = jnp.asarray(r.q[np.linspace(0, len(r.q) - 1, POSES).astype(int)])
