@@ -115,7 +115,7 @@ def _torque_change(robot: Robot, ex: Explanation, dphi: np.ndarray, k: int) -> s
 
 
 def unexplained_entry(robot: Robot, u: Unexplained) -> dict[str, Any]:
-    """The contract's entry for structure without a name."""
+    """The contract's entry for structure that no effect explains."""
     name = robot.joint_names[u.joint]
     unit = "N" if robot.is_slide[u.joint] else "N m"
     return {
