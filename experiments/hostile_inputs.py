@@ -174,6 +174,7 @@ class Arm:
             return make
 
         columns: dict[str, Any] = {name: self.table[name].to_numpy() for name in self.table}
+
         def with_t(t: Any) -> Callable[[pathlib.Path], None]:
             changed: dict[str, Any] = {**columns, "t": t}
             return lambda path: np.savez(path, **changed)

@@ -29,7 +29,7 @@ def example_diagnosis() -> dict:
                     "static": {"value": 12.913, "std": 0.31, "unit": "N m"},
                     "stribeck_velocity": {"value": 0.1173, "std": 0.0089, "unit": "rad/s"},
                 },
-                "certain": "Beyond what rigid bodies explain, the torque needs 8.9 N m RMS on joint2.",
+                "certain": "Besides the rigid-body model, a torque of 8.9 N m RMS on joint2 is needed.",
                 "evidence": {"log_odds": 1843.7, "probability": 0.97, "heldout_gain": 0.88},
                 "alternatives": [
                     {
@@ -44,7 +44,7 @@ def example_diagnosis() -> dict:
                 "joints": ["joint5", "joint6"],
                 "where": "On joint5 and joint6, in proportion to the difference of their speeds.",
                 "parameters": {"viscous": {"value": 2.31, "std": 0.04, "unit": "N m s/rad"}},
-                "certain": "Beyond what rigid bodies explain, the torque needs 1.2 N m RMS on joint5.",
+                "certain": "Besides the rigid-body model, a torque of 1.2 N m RMS on joint5 is needed.",
                 "evidence": {"log_odds": 412.2, "probability": 0.999, "heldout_gain": 0.61},
                 "alternatives": [],
             },

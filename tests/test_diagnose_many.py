@@ -16,7 +16,7 @@ from helpers_fleet import made_at_once, units_folder
 import irb140_jax.fleet.run
 from irb140_jax import cli
 from irb140_jax.errors import InputError
-from irb140_jax.fleet import diagnose_units, shard_of, shelf, units_in, write_table_and_page
+from irb140_jax.fleet import diagnose_units, results_store, shard_of, units_in, write_table_and_page
 from irb140_jax.fleet.workers import Done, _tried
 from irb140_jax.recordings import write_recording
 from irb140_jax.recordings.conceal import conceal, random_robot
@@ -27,11 +27,11 @@ from irb140_jax.robot import load_robot
 RUN = """
 import pathlib, sys
 import helpers_fleet
-from irb140_jax.fleet import diagnose_units, shelf, units_in, write_table_and_page
+from irb140_jax.fleet import diagnose_units, results_store, units_in, write_table_and_page
 folder, out, work = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), getattr(helpers_fleet, sys.argv[3])
 if __name__ == "__main__":
     units = units_in(folder)
-    with shelf(out, "1/1", {}, [folder]) as place:
+    with results_store(out, "1/1", {}, [folder]) as place:
         list(diagnose_units(units, place, work, 2))
         write_table_and_page(place, units, folder.name, [folder])
 """
@@ -50,7 +50,7 @@ def run(folder: pathlib.Path, out: pathlib.Path, part: str = "1/1") -> pd.DataFr
     """A run without any further process; its table."""
     here = lambda tasks, work, jobs: (Done(task, *_tried(work, task)) for task in tasks)  # noqa: E731
     units = units_in(folder)
-    with shelf(out, part, {}, [folder]) as place, pytest.MonkeyPatch.context() as patch:
+    with results_store(out, part, {}, [folder]) as place, pytest.MonkeyPatch.context() as patch:
         patch.setattr(irb140_jax.fleet.run, "run_tasks", here)
         list(diagnose_units(shard_of(units, part), place, made_at_once, 1))
         write_table_and_page(place, units, folder.name, [folder])
@@ -141,7 +141,8 @@ def test_shards_in_one_folder_end_with_the_table_of_a_single_run(tmp_path):
 
 def test_two_runs_cannot_work_on_one_part(tmp_path):
     folder = units_folder(tmp_path / "u", ["ok"])
-    with shelf(tmp_path / "d", "1/1", {}, [folder]), pytest.raises(InputError, match="another run works on part 1/1"):
+    said = "another run works on part 1/1"
+    with results_store(tmp_path / "d", "1/1", {}, [folder]), pytest.raises(InputError, match=said):
         run(folder, tmp_path / "d")
 
 

@@ -101,6 +101,8 @@ FOUR = (  # Gauss and Legendre's points and weights
     (-0.8611363115940526, 0.3478548451374538), (-0.3399810435848563, 0.6521451548625461),
     (0.3399810435848563, 0.6521451548625461), (0.8611363115940526, 0.3478548451374538),
 )  # fmt: skip
+
+
 def shifted(p, m):
     """What a delay of all torques adds, by Gauss and Legendre's rule."""
     at = [m.t + 0.5 * (1.0 + u) * p["delay"] for u, _ in FOUR]

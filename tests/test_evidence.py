@@ -30,7 +30,7 @@ def stretches(seed: int, rows: int = 70, recordings: int = 2) -> list[Stretch]:
         use[20:24, 0] = False
         zero = np.zeros((rows, JOINTS))
         t = np.arange(rows) / 50.0
-        out.append(Stretch(r, t, 0.0, X, y, True, X, y, zero, zero, use, zero, zero, zero, zero, zero))
+        out.append(Stretch(r, t, 0.0, X, y, X, y, zero, zero, use, zero, zero, zero, zero, zero))
     return out
 
 

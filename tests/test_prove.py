@@ -6,11 +6,11 @@ from helpers_recordings import recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
-from irb140_jax.mismatch.enough import sensor_scatter
 from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation
 from irb140_jax.mismatch.prove import folds, held_out, held_out_gains, refitted
 from irb140_jax.mismatch.selection.selected import noise_left
+from irb140_jax.mismatch.sensor_noise import scatter_by_sensor
 from irb140_jax.recordings.condition import Conditioned, choose_band, condition
 from irb140_jax.recordings.low_pass import Band
 
@@ -22,7 +22,7 @@ def recorded(*sizes: float) -> tuple[list[Conditioned], Band, np.ndarray]:
     logs, arm = [recording(seed=4 + k, size=size, noise=0.2) for k, size in enumerate(sizes)], robot()
     band = choose_band(logs, arm)
     smooth = [condition(log, band) for log in logs]
-    return smooth, band, sensor_scatter(arm, logs, smooth, band)
+    return smooth, band, np.hypot(*scatter_by_sensor(arm, logs, smooth, band))
 
 
 def explained(*sizes: float) -> Explanation:

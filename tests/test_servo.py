@@ -180,10 +180,10 @@ def test_predict_compares_with_the_torque_of_the_servo_that_was_diagnosed(rubbin
     assert rms(measured - corrected) < 0.5 * rms(measured - nominal)
 
 
-def test_viscous_friction_of_a_servo_is_said_to_be_one_class_with_kd(robot):
+def test_viscous_friction_of_a_servo_is_said_to_be_known_only_with_kd(robot):
     result = diagnosed(robot, STATED, shoulder='damping="0.4"')
     assert names(result) == {("viscous_friction", "shoulder")}
     said = result.diagnosis["findings"][0]["certain"]
-    known = float(said.split("the sum of both, ")[1].split(";")[0])
-    assert "one class with the drive's Kd" in said
+    known = float(said.split("the sum of both, ")[1].split(",")[0])
+    assert "can't be told from the drive's Kd" in said
     assert abs(known - 2.4) < 0.05  # Kd 2 and 0.4: known better than either

@@ -6,7 +6,7 @@ from typing import Any
 import helpers_recordings as made
 import numpy as np
 
-from irb140_jax.mismatch.words import _masses_known, _what_moved
+from irb140_jax.mismatch.words import _masses_known, _torque_change
 
 
 def explanation(seed: int = 0) -> Any:
@@ -23,7 +23,7 @@ def test_wrong_inertials_are_said_by_the_torque_that_they_change():
     ex, dphi = explanation(), np.zeros(30)
     dphi[[3, 10]] = 5.0, -2.0  # a link before the one in question, and that one's mass
     change = 2.0 * np.sqrt(np.mean(ex.data.stretches[0].rigid[..., 10] ** 2, axis=0))
-    said = _what_moved(made.robot(), ex, dphi, 1)
+    said = _torque_change(made.robot(), ex, dphi, 1)
     assert "kg" not in said and "wrist" not in said
     assert f"shoulder by {change[0]:.3g} N m RMS" in said and f"elbow by {change[1]:.3g} N m RMS" in said
 

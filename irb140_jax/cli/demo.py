@@ -54,20 +54,20 @@ irb140 demo --seed 7 --out demo     another effect, joint and strength"""
         terminal = console(stderr=self.json)
         said = f"Something may be hidden in these recordings. SHA-256 of the truth: {case.seal}"
         terminal.print(said, soft_wrap=True)
-        result = _from_files(case, results.desk)
+        result = _from_files(case, results.workspace)
         reveal = revealed(case.truth["effects"], result.diagnosis, case.seal)
-        folder = results.write(lambda folder: _write(result, reveal, case, results.desk, folder, out))
+        folder = results.write(lambda folder: _write(result, reveal, case, results.workspace, folder, out))
         tell_kept(results)
         show(result, out if folder == results.folder else folder, json=self.json)
         print_reveal(reveal, terminal)
 
 
-def _from_files(case: "ConcealedCase", desk: pathlib.Path) -> "Result":
+def _from_files(case: "ConcealedCase", workspace: pathlib.Path) -> "Result":
     """The diagnosis of the recordings as files, the same that `irb140 diagnose` would make of them."""
     from irb140_jax.recordings import read_recording, write_recording
     from irb140_jax.robot import irb140
 
-    paths = [desk / "recordings" / f"{recording.source}.csv" for recording in case.recordings]
+    paths = [workspace / "recordings" / f"{recording.source}.csv" for recording in case.recordings]
     for recording, path in zip(case.recordings, paths, strict=True):
         write_recording(recording, path)
     robot = irb140()
@@ -75,7 +75,7 @@ def _from_files(case: "ConcealedCase", desk: pathlib.Path) -> "Result":
 
 
 def _write(
-    result: "Result", reveal: "Reveal", case: "ConcealedCase", desk: pathlib.Path, folder: pathlib.Path,
+    result: "Result", reveal: "Reveal", case: "ConcealedCase", workspace: pathlib.Path, folder: pathlib.Path,
     out: pathlib.Path,
 ) -> None:  # fmt: skip
     """Recordings, diagnosis, report and truth into an empty folder, which will be `out`."""
@@ -83,7 +83,7 @@ def _write(
     from irb140_jax.recordings.conceal import sealed
     from irb140_jax.report import html_report
 
-    shutil.copytree(desk, folder, dirs_exist_ok=True)
+    shutil.copytree(workspace, folder, dirs_exist_ok=True)
     save(result, folder)
     (folder / "report.html").write_text(html_report(result.diagnosis, result.views, reveal, out), encoding="utf-8")
     truth = case.truth | {"sealed": sealed(case.truth), "seal": case.seal}

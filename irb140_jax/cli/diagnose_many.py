@@ -15,6 +15,7 @@ from irb140_jax.errors import InputError
 if TYPE_CHECKING:
     from irb140_jax.fleet import Unit
     from irb140_jax.fleet.run import Progress, Task
+    from irb140_jax.fleet.store import ResultsStore
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,34 +66,36 @@ irb140 diagnose-many fleet --out d --shard 2/8        the second of eight machin
         for option, path in (("--robot", self.robot), ("--columns", self.columns)):
             if path and not path.is_file():
                 raise InputError(f"{option} {path}: there is no such file; check the path")
-        from irb140_jax.fleet import shard_of, shelf, units_in, write_table_and_page
+        from irb140_jax.fleet import results_store, shard_of, units_in, write_table_and_page
         from irb140_jax.report.many import headline
 
         real = self.folder.resolve()
         units = units_in(self.folder, self.robot, self.columns)
         mine, out = shard_of(units, self.shard), self.out or real.with_name(f"{real.name}-diagnoses")
         inputs = [path for path in (self.folder, self.robot, self.columns) if path]
-        with shelf(out, self.shard, self._settings(), inputs) as place:
-            refused = self._diagnose(mine, place, jobs, out)
-            rows = write_table_and_page(place, units, real.name, inputs)
+        with results_store(out, self.shard, self._settings(), inputs) as store:
+            refused = self._diagnose(mine, store, jobs, out)
+            rows = write_table_and_page(store, units, real.name, inputs)
         terminal = console()
         terminal.print(headline(rows, len(units) - len(rows)), soft_wrap=True, markup=False)
         for row in refused:
             terminal.print(f"  {row['unit']}: {row['message']}", soft_wrap=True, markup=False)
         terminal.print(f"Table: {out / 'table.parquet'}, page: {out / 'index.html'}", soft_wrap=True, markup=False)
 
-    def _diagnose(self, mine: list["Unit"], place, jobs: int, out: pathlib.Path) -> list[dict[str, Any]]:
+    def _diagnose(
+        self, mine: list["Unit"], store: "ResultsStore", jobs: int, out: pathlib.Path
+    ) -> list[dict[str, Any]]:
         """Diagnose the units of this part; the rows of those for which that was not possible."""
         from irb140_jax.fleet import diagnose_units
 
         with progress() as tell:
             try:
-                for step in diagnose_units(mine, place, self._work(), jobs):
+                for step in diagnose_units(mine, store, self._work(), jobs):
                     tell(_said(step))
             except (KeyboardInterrupt, SystemExit):
                 tell(f"stopped; the same command goes on with what is left, in {out}")
                 raise
-        rows = [row for unit in mine if (row := place.row(unit.name))]
+        rows = [row for unit in mine if (row := store.row(unit.name))]
         return [row for row in rows if row["status"] != "diagnosed"]
 
     def _work(self) -> "Work":

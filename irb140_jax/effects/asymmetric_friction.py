@@ -47,6 +47,6 @@ class AsymmetricFriction(AbstractEffect):
 
     def where(self, names, values, units):
         return (
-            f"{names}: {values['coulomb_pos']:.3g} {units['coulomb_pos']} while moving up, "
-            f"{values['coulomb_neg']:.3g} {units['coulomb_neg']} while moving down"
+            f"{names}: {values['coulomb_pos']:.3g} {units['coulomb_pos']} while moving in the positive direction, "
+            f"{values['coulomb_neg']:.3g} {units['coulomb_neg']} in the negative direction"
         )

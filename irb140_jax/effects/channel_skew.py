@@ -1,4 +1,4 @@
-"""Channel skew: the torque of one joint is logged early or late, beside its position and the other joints' torques."""
+"""Channel skew: one joint's torque is logged early or late, relative to its position and to the other torques."""
 
 import numpy as np
 
@@ -28,4 +28,4 @@ class ChannelSkew(AbstractDelay):
 
     def where(self, names, values, units):
         early = "early" if values["delay"] > 0.0 else "late"
-        return f"{names}: its torque is logged {1e3 * abs(values['delay']):.3g} ms {early} beside its position"
+        return f"{names}: its torque is logged {1e3 * abs(values['delay']):.3g} ms {early} relative to its position"

@@ -69,7 +69,8 @@ class JointElasticity(AbstractEffect):
 
     def where(self, names, values, units):
         stiffness = f"{values['stiffness']:.3g} {units['stiffness']}"
-        return f"{names}: where the torque changes quickly and where gravity deflects the joint; {stiffness}"
+        where = "where the torque changes quickly and where gravity deflects the joint"
+        return f"{names}: {where}; its stiffness is {stiffness}"
 
 
 def _swing(load, mass, damping, spring, dt):

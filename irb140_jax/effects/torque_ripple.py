@@ -73,6 +73,6 @@ class TorqueRipple(AbstractEffect):
 
     def where(self, names, values, units):
         return (
-            f"{names}: {values['amplitude']:.3g} {units['amplitude']} that repeat every "
+            f"{names}: {values['amplitude']:.3g} {units['amplitude']} of amplitude, repeating every "
             f"{1 / values['cycles_per_rad']:.3g} {units['cycles_per_rad'][2:]} of position"
         )

@@ -22,7 +22,7 @@ class Given(NamedTuple):
     diagnosis: Mapping[str, Any]
 
 
-Place = tuple[str, tuple[str, ...]]  # an effect and its joints
+Site = tuple[str, tuple[str, ...]]  # an effect and its joints
 
 
 def compare(given: Sequence[Given], same_within: float = 0.1) -> dict[str, Any]:
@@ -39,8 +39,8 @@ def compare(given: Sequence[Given], same_within: float = 0.1) -> dict[str, Any]:
         InputError: They can't be compared: fewer than two, other joints, or the same recording in two of them.
     """
     _check(given)
-    places = dict.fromkeys(_place(f) for one in given for f in one.diagnosis["findings"])
-    every = [_parameters(given, place) for place in places]
+    sites = dict.fromkeys(_site(f) for one in given for f in one.diagnosis["findings"])
+    every = [_parameters(given, site) for site in sites]
     tested = [p for parameters in every for p in parameters if p["p"] is not None]
     for p, adjusted in zip(tested, holm([p["p"] for p in tested]), strict=True):
         p["p_holm"] = adjusted
@@ -48,7 +48,7 @@ def compare(given: Sequence[Given], same_within: float = 0.1) -> dict[str, Any]:
     for p in [p for parameters in every for p in parameters]:
         p["says"] = _judged(p, same_within)
         p["sentence"] = said_of_parameter(p, names, same_within)
-    effects = [_effect(given, place, own) for place, own in zip(places, every, strict=True)]
+    effects = [_effect(given, site, own) for site, own in zip(sites, every, strict=True)]
     effects.sort(key=lambda one: (ORDER.index(one["says"]), -min(len(one["named_in"]), 99)))
     return _rounded({
         "schema": SCHEMA,
@@ -78,17 +78,17 @@ def _check(given: Sequence[Given]) -> None:
                              "independent; compare diagnoses of different recordings")  # fmt: skip
 
 
-def _place(finding: Mapping[str, Any]) -> Place:
+def _site(finding: Mapping[str, Any]) -> Site:
     return finding["effect"], tuple(finding["joints"])
 
 
-def _finding(one: Given, place: Place) -> Mapping[str, Any] | None:
-    return next((f for f in one.diagnosis["findings"] if _place(f) == place), None)
+def _finding(one: Given, site: Site) -> Mapping[str, Any] | None:
+    return next((f for f in one.diagnosis["findings"] if _site(f) == site), None)
 
 
-def _parameters(given: Sequence[Given], place: Place) -> list[dict[str, Any]]:
+def _parameters(given: Sequence[Given], site: Site) -> list[dict[str, Any]]:
     """Every parameter of an effect with its values and, where there are two or more, tests and intervals."""
-    found = [_finding(one, place) for one in given]
+    found = [_finding(one, site) for one in given]
     names = dict.fromkeys(name for f in found if f for name in f["parameters"])
     return [_parameter(name, [f["parameters"].get(name) if f else None for f in found]) for name in names]
 
@@ -129,20 +129,20 @@ def _judged(p: Mapping[str, Any], same_within: float) -> str:
     return "differs" if p["p_holm"] < LEVEL else "cannot_tell"
 
 
-def _effect(given: Sequence[Given], place: Place, parameters: list[dict[str, Any]]) -> dict[str, Any]:
+def _effect(given: Sequence[Given], site: Site, parameters: list[dict[str, Any]]) -> dict[str, Any]:
     """An effect: which diagnoses name it, and why the others may not."""
-    named = [k for k, one in enumerate(given) if _finding(one, place)]
+    named = [k for k, one in enumerate(given) if _finding(one, site)]
     said = [p["says"] for p in parameters] or ["cannot_tell"]
     says = min([*said, *(["named_in_some"] if len(named) < len(given) else [])], key=ORDER.index)
-    without = [{"of": k, "why": _why_not(given[k], place)} for k in range(len(given)) if k not in named]
-    sentence = said_of_effect(place, named, without, [one.name for one in given])
-    return {"effect": place[0], "joints": list(place[1]), "says": says, "named_in": named, "not_named_in": without,
+    without = [{"of": k, "why": _why_not(given[k], site)} for k in range(len(given)) if k not in named]
+    sentence = said_of_effect(named, without, [one.name for one in given])
+    return {"effect": site[0], "joints": list(site[1]), "says": says, "named_in": named, "not_named_in": without,
             "sentence": sentence, "parameters": parameters}  # fmt: skip
 
 
-def _why_not(one: Given, place: Place) -> str:
+def _why_not(one: Given, site: Site) -> str:
     """Why a diagnosis doesn't name an effect that another one names, as far as it says."""
-    slug, joints = place
+    slug, joints = site
     for f in one.diagnosis["findings"]:
         if set(f["joints"]) & set(joints) and slug in [a["effect"] for a in f["alternatives"]]:
             return f"alternative:{f['effect']}"

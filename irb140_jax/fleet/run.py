@@ -1,4 +1,4 @@
-"""All units of a part, side by side: each is diagnosed, put into its place, and told of."""
+"""All units of a part, side by side: each is diagnosed, stored, and reported."""
 
 import json
 import pathlib
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from irb140_jax.fleet.layout import Unit
 from irb140_jax.fleet.row import row_of, row_without
-from irb140_jax.fleet.shelf import Shelf
+from irb140_jax.fleet.store import ResultsStore
 from irb140_jax.fleet.workers import Done, run_tasks
 from irb140_jax.report.made import DIAGNOSIS
 
@@ -43,43 +43,43 @@ class Progress(NamedTuple):
     left: float | None
 
 
-def diagnose_units(units: Sequence[Unit], place: Shelf, work: Diagnosing, jobs: int) -> Iterator[Progress]:
+def diagnose_units(units: Sequence[Unit], store: ResultsStore, work: Diagnosing, jobs: int) -> Iterator[Progress]:
     """Diagnose the units that have no row yet.
 
     Args:
         units: The units.
-        place: Where the results go.
+        store: Where the results go.
         work: Diagnoses one; a function of a module.
         jobs: Processes to do so in.
 
     Yields:
         How far it is, first before anything is done.
     """
-    open_ = [unit for unit in units if not place.done(unit)]
+    open_ = [unit for unit in units if not store.done(unit)]
     before, start = len(units) - len(open_), time.monotonic()
     yield Progress("", "", before, len(units), None)
     done = before
     for unit in [unit for unit in open_ if unit.problem]:
-        place.put(unit, place.key(unit), row_without(unit, "refused", unit.problem))
+        store.put(unit, store.key(unit), row_without(unit, "refused", unit.problem))
         done += 1
         yield Progress(unit.name, "refused", done, len(units), None)
-    tasks = [Task(unit, place.desk / f"new-{unit.name}", place.key(unit)) for unit in open_ if not unit.problem]
+    tasks = [Task(unit, store.workspace / f"new-{unit.name}", store.key(unit)) for unit in open_ if not unit.problem]
     tasks.sort(key=_size, reverse=True)  # the longest first, so that none of them is waited for in the end
     for k, one in enumerate(run_tasks(tasks, work, jobs), 1):
-        status, done = _put(place, one), done + 1
+        status, done = _put(store, one), done + 1
         left = (time.monotonic() - start) / k * (len(tasks) - k)
         yield Progress(one.task.unit.name, status, done, len(units), left)
 
 
-def _put(place: Shelf, one: Done) -> str:
-    """Put what a process made into its place."""
+def _put(store: ResultsStore, one: Done) -> str:
+    """Put what a process made into the store."""
     unit, fresh, key = one.task
     if one.status != "diagnosed":
         shutil.rmtree(fresh, ignore_errors=True)
-        place.put(unit, key, row_without(unit, one.status, one.message))
+        store.put(unit, key, row_without(unit, one.status, one.message))
         return one.status
     diagnosis = json.loads((fresh / DIAGNOSIS).read_text(encoding="utf-8"))
-    place.put(unit, key, row_of(unit, diagnosis), fresh)
+    store.put(unit, key, row_of(unit, diagnosis), fresh)
     return diagnosis["verdict"]
 
 

@@ -38,9 +38,7 @@ def said_of_parameter(p: Mapping[str, Any], names: Sequence[str], same_within: f
             f"is possible; {between} it is {change}.")  # fmt: skip
 
 
-def said_of_effect(
-    place: tuple[str, tuple[str, ...]], named: Sequence[int], without: Sequence[Mapping[str, Any]], names: Sequence[str]
-) -> str:
+def said_of_effect(named: Sequence[int], without: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
     """Which diagnoses name an effect, and what the others say of it."""
     if not without:
         return f"All {len(named)} diagnoses name it."

@@ -9,7 +9,7 @@ import pyarrow.parquet
 
 from irb140_jax.fleet.layout import Unit
 from irb140_jax.fleet.row import FACTORS
-from irb140_jax.fleet.shelf import COMMAND, Shelf, alone
+from irb140_jax.fleet.store import COMMAND, ResultsStore, only_writer
 from irb140_jax.report import results_folder
 from irb140_jax.report.many import many_html
 
@@ -25,12 +25,12 @@ COLUMNS = pyarrow.schema([
 
 
 def write_table_and_page(
-    place: Shelf, units: Sequence[Unit], name: str, inputs: Iterable[pathlib.Path]
+    store: ResultsStore, units: Sequence[Unit], name: str, inputs: Iterable[pathlib.Path]
 ) -> list[dict[str, Any]]:
     """Write the table and the page of all units that have a row, those of other parts included.
 
     Args:
-        place: Where the rows are.
+        store: Where the rows are.
         units: All units, of every part.
         name: Of the folder of recordings.
         inputs: Files and folders that are read.
@@ -38,14 +38,14 @@ def write_table_and_page(
     Returns:
         The rows.
     """
-    with alone(place.out):
-        rows = [row for unit in units if (row := place.row(unit.name))]
+    with only_writer(store.out):
+        rows = [row for unit in units if (row := store.row(unit.name))]
 
         def write(folder: pathlib.Path) -> None:
             write_parquet(rows, folder / TABLE)
             (folder / PAGE).write_text(many_html(rows, name, len(units) - len(rows)), encoding="utf-8")
 
-        with results_folder(place.out, COMMAND, inputs) as results:
+        with results_folder(store.out, COMMAND, inputs) as results:
             results.write(write)
     return rows
 

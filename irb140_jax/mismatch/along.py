@@ -53,7 +53,6 @@ class Loads(NamedTuple):
         scaled, asked: Those whose rates are in `Motion`.
     """
 
-
     load: np.ndarray
     total: np.ndarray
     carried: np.ndarray

@@ -1,13 +1,13 @@
-"""What holds of a finding whichever of its alternatives is true: the torque itself, not its name."""
+"""What is certain of a finding whichever of its alternatives is true: the torque itself, not its name."""
 
 import numpy as np
 
 from irb140_jax.mismatch.explanation import Explanation
 from irb140_jax.robot import Robot
 
-MOST_OF = 0.05  # of the finding's power: joints with less of it are not listed
-MOVING = 0.9  # |direction of motion| from which a row counts as one way or the other
-TWO_WAYS = ("torque_offset",)  # beside friction: what is a level of torque while the joint moves
+LEAST_POWER = 0.05  # of the finding's: joints with less of it are not listed
+SLOW = 0.1  # of a joint's highest speed: slower rows are left out of the means by direction
+LEVELS = ("torque_offset",)  # effects beside friction that are a level of torque while the joint moves
 
 
 def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray, gain: float) -> str:
@@ -33,37 +33,40 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
     rows = np.maximum(sum(u.sum(axis=0) for u in use), 1)
     logged = np.sqrt(sum(np.sum(np.where(s.use, s.tau, 0.0) ** 2, axis=0) for s in ex.data.stretches) / rows)
     rms = np.sqrt(power / rows)
-    listed = [j for j in np.argsort(-power) if power[j] > MOST_OF * power.sum()]
+    listed = [j for j in np.argsort(-power) if power[j] > LEAST_POWER * power.sum()]
     sizes = [
         f"{rms[j]:.3g} {_unit(robot, j)} RMS on {robot.joint_names[j]} ({_percent(rms[j] / max(logged[j], 1e-300))} of "
-        "what is logged there)"
+        "its logged torque)"
         for j in listed
     ]
-    said = f"Beyond what rigid bodies explain, the torque needs {_listed(sizes)}"
-    said += f"; it removes {_percent(float(np.clip(gain, 0.0, 0.9999)))} of the squared error on unseen data"
-    if len(c.joints) == 1 and (c.effect.friction or c.slug in TWO_WAYS):
-        said += _two_ways(robot, ex, c.joints[0], columns, w, cov)
+    said = f"Besides the rigid-body model, a torque of {_listed(sizes)} is needed"
+    said += f"; adding it removes {_percent(float(np.clip(gain, 0.0, 0.9999)))} of the squared error on unseen data"
+    if len(c.joints) == 1 and (c.effect.friction or c.slug in LEVELS):
+        said += _mean_by_direction(robot, ex, c.joints[0], columns, w, cov)
     return said + "."
 
 
-def _two_ways(
+def _mean_by_direction(
     robot: Robot, ex: Explanation, j: int, columns: np.ndarray, w: np.ndarray, cov: np.ndarray
 ) -> str:
-    """Mean torque of the finding while the joint moves towards + and towards -."""
-    fast = [np.abs(s.qd[:, j]) > (1.0 - MOVING) * np.max(np.abs(s.qd[:, j]), initial=0.0) for s in ex.data.stretches]
+    """Mean torque of the finding in either direction of motion, in words; empty if a direction has no rows."""
+    fast = [np.abs(s.qd[:, j]) > SLOW * np.max(np.abs(s.qd[:, j]), initial=0.0) for s in ex.data.stretches]
     said = []
-    for sign, word in ((1.0, "+"), (-1.0, "-")):
-        mean = [
+    for sign in (1.0, -1.0):
+        moving = [
             s.X[s.use[:, j] & f & (sign * s.qd[:, j] > 0.0), j][:, columns]
             for s, f in zip(ex.data.stretches, fast, strict=True)
         ]
-        rows = np.concatenate(mean)
+        rows = np.concatenate(moving)
         if len(rows) == 0:
             return ""
-        a = rows.mean(axis=0)
-        std = np.sqrt(max(a @ cov @ a, 0.0))
-        said.append(f"{a @ w:.3g} +- {std:.1g} {_unit(robot, j)} while it moves towards {word}")
-    return f"; it is on average {said[0]} and {said[1]}"
+        mean = rows.mean(axis=0)
+        std = np.sqrt(max(mean @ cov @ mean, 0.0))
+        said.append(f"{mean @ w:.3g} +- {std:.1g} {_unit(robot, j)}")
+    return (
+        f"; it is on average {said[0]} while the joint moves in its positive direction and {said[1]} while it moves in "
+        "its negative direction"
+    )
 
 
 def _unit(robot: Robot, j: int) -> str:

@@ -116,7 +116,7 @@ class CorrectedRobot(AbstractPlant):
         Raises:
             InputError: An effect has a memory; simulate with `simulate.play`, which keeps it.
         """
-        return self._acceleration(q, qd, tau, lambda qdd: self.inverse_dynamics(q, qd, qdd, t))
+        return self._acceleration(q, tau, lambda qdd: self.inverse_dynamics(q, qd, qdd, t))
 
     def at_rest(self, q: Joints) -> Memory:
         """What the effects remember after standing still at q.
@@ -153,13 +153,13 @@ class CorrectedRobot(AbstractPlant):
             after.append(held)
         time = jnp.atleast_1d(t)
         inverse = lambda qdd: _torque(self, time, q[None], qd[None], qdd[None], tuple(columns))[0]  # noqa: E731
-        return self._acceleration(q, qd, tau, inverse), tuple(after)
+        return self._acceleration(q, tau, inverse), tuple(after)
 
     def without(self, *slugs: str) -> "CorrectedRobot":
         """The same model without some of its effects."""
         return eqx.tree_at(lambda r: r.effects, self, tuple(a for a in self.effects if a.effect.slug not in slugs))
 
-    def _acceleration(self, q: Joints, qd: Joints, tau: Joints, inverse) -> Joints:
+    def _acceleration(self, q: Joints, tau: Joints, inverse) -> Joints:
         """Newton's method on inverse dynamics, from rest."""
 
         def step(_, qdd):

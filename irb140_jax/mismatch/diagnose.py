@@ -12,16 +12,6 @@ from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import locate
-from irb140_jax.mismatch.enough import (
-    all_open,
-    coarse_positions,
-    comparable,
-    scatter_by_sensor,
-    too_little,
-    torque_size,
-    undecidable,
-    usable_rows,
-)
 from irb140_jax.mismatch.evidence import Posterior
 from irb140_jax.mismatch.explain import explain
 from irb140_jax.mismatch.explanation import Explanation, fitted
@@ -31,11 +21,13 @@ from irb140_jax.mismatch.motion import proof_in_motion
 from irb140_jax.mismatch.motion.windows import spans
 from irb140_jax.mismatch.native import beyond_file, native_gap
 from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, notes
+from irb140_jax.mismatch.nothing_compared import all_open
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, recordings_of_blocks, refitted
 from irb140_jax.mismatch.provenance import provenance
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.regression.nuisances import feature_coefficients
 from irb140_jax.mismatch.selection.selected import NAMED
+from irb140_jax.mismatch.sensor_noise import coarse_positions, scatter_by_sensor
 from irb140_jax.mismatch.servos import (
     command_notes,
     of_servos,
@@ -43,8 +35,10 @@ from irb140_jax.mismatch.servos import (
     with_useful_discrepancy,
     without_negligible,
 )
+from irb140_jax.mismatch.sufficient_data import comparable, too_little, usable_rows
 from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
 from irb140_jax.mismatch.undecided import Undecided, undecided
+from irb140_jax.mismatch.undecided_joints import torque_size, undecidable
 from irb140_jax.mismatch.unknown import Unexplained, unexplained
 from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
 from irb140_jax.recordings.channels import with_lost_torque_marked

@@ -17,7 +17,7 @@ from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.mismatch.silent import SILENT
 from irb140_jax.robot import Robot
 
-WORTH_SAYING = 0.02  # alternatives less probable than this stay unsaid
+LEAST_PROBABILITY = 0.02  # of an alternative that is listed
 
 
 def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
@@ -70,13 +70,15 @@ def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     return [{
         "effect": "torque_gain",
         "joints": list(robot.joint_names),
-        "where": f"all joints: in proportion to the torque of the links; the real torque is {gain:.3g} x the logged",
+        "where": (
+            f"all joints: in proportion to the rigid-body torque; the real torque is {gain:.3g} times the logged one"
+        ),
         "parameters": {"gain": {"value": gain, "std": spread, "unit": "1"}},
-        # Without it the inertials stand in for it, as wrong as that takes: on unseen data it is worth nothing.
+        # Without it refitted inertials explain the same torque, so it removes no error on unseen data.
         "evidence": {"log_odds": odds, "probability": probability, "heldout_gain": 0.0},
         "certain": (
-            f"The torque of all joints is logged {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} for the stated "
-            "masses; only a known payload tells wrong torque constants from masses all wrong alike."
+            f"The logged torque of all joints is {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} for the stated "
+            "masses; only a known payload can tell wrong torque constants from masses that are all wrong by one factor."
         ),
         "alternatives": [],
     }]  # fmt: skip
@@ -95,11 +97,11 @@ def _log_odds(ex: Explanation, index: int) -> float:
 
 
 def _alternatives(ex: Explanation, index: int) -> list[dict[str, Any]]:
-    """What may stand in a finding's place, and what to record; a part of its law that stays is no alternative."""
+    """Effects that may be true in a finding's place, and what to record; a part of its law is no alternative to it."""
     c = ex.data.candidates[index]
     best: dict[str, float] = {}
     for (slug, _), p in ex.rivals(index).items():
-        if slug not in SILENT and slug != c.slug and p > WORTH_SAYING:
+        if slug not in SILENT and slug != c.slug and p > LEAST_PROBABILITY:
             best[slug] = max(best.get(slug, 0.0), p)
     parts = {slug: p for slug, p in best.items() if slug in c.effect.contains}
     others = {slug: p for slug, p in best.items() if slug not in parts}
@@ -116,8 +118,9 @@ def _alternatives(ex: Explanation, index: int) -> list[dict[str, Any]]:
 def _separation(one: AbstractEffect, other: AbstractEffect, stays: list[str]) -> str:
     motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
     motion = motion or f"{one.needs}; and, for {other.title}, {other.needs}"
-    beside = " and ".join(CATALOGUE[s].title for s in stays)
-    return f"Record {motion}" + (f" ({beside} is there in either case)." if stays else ".")
+    both = " and ".join(CATALOGUE[s].title for s in stays)
+    present = f" ({both} {'is' if len(stays) == 1 else 'are'} there in either case)" if stays else ""
+    return f"Record {motion}{present}."
 
 
 def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any]]:

@@ -275,7 +275,7 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
     return CorrectedModel(
         Robot(
             **leaves,  # pyright: ignore[reportArgumentType]: arrays only, static fields are named below
- joint_names=tuple(robot["joint_names"]), is_slide=tuple(robot["is_slide"]), name=robot["name"],
+            joint_names=tuple(robot["joint_names"]), is_slide=tuple(robot["is_slide"]), name=robot["name"],
             parent=tuple(robot.get("parent", ())),
         ),
         np.array(data["phi_refit"]),

@@ -12,7 +12,7 @@ from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
-SLOPE = SCALED.index("slope")
+FRICTION_LEVELS = SCALED.index("slope")  # dry friction of each recording about the mean over all
 NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
 
 
@@ -33,13 +33,17 @@ def notes(
     out += [f"{r.source}: {_sentence(note)}" for r in smooth for note in r.notes]
     for name, count, enough in zip(robot.joint_names, rows, judged, strict=True):
         if not enough:
-            out.append(f"{name} is not judged: it moves in only {count} usable rows; record a motion of {name}.")
-    out.append(f"The model's inertials are taken to be right to {100 * uncertainty:.3g} % (--inertial-uncertainty).")
+            out.append(f"{name} is not judged: it moves in only {count} usable rows; record motion of this joint.")
+    out.append(
+        f"The model's inertial parameters are assumed to be right to {100 * uncertainty:.3g} %, one standard deviation "
+        "(--inertial-uncertainty)."
+    )
     if not judged.any():
         return list(dict.fromkeys(out))
     out.append(
-        f"Compared below {band.torque:.3g} Hz; positions were smoothed below {band.position:.3g} Hz and "
-        "differentiated. Figures leave out rows in which the joint rests: dry friction is undetermined there."
+        f"Model and recordings are compared below {band.torque:.3g} Hz; positions were smoothed with a bandwidth of "
+        f"{band.position:.3g} Hz and differentiated. All figures of a joint leave out the rows in which it rests, "
+        "because dry friction is undetermined there."
     )
     return list(dict.fromkeys(out))
 
@@ -54,12 +58,13 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
         left_out: Effects that MJCF can't hold, or not whole.
     """
     if gap is None:
-        return ["corrected.xml could not be compared with the corrected model: MuJoCo has other joints."]
-    reason = f"it lacks {', '.join(left_out)} in whole or in part" if left_out else (
-        "a link of the model has inertials that are physically impossible, and keeps them in the file")
+        return ["corrected.xml could not be compared with the corrected model: MuJoCo reads other joints from it."]
+    reason = f"the file can't hold all of {', '.join(left_out)}" if left_out else (
+        "a link of the given model has inertial parameters that no body can have, and the file keeps them")
     return [
         f"On {name} the torque of corrected.xml differs from that of the corrected model by {g:.3g} "
-        f"{'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of its torque): {reason}. Use `irb140 predict` instead."
+        f"{'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of the joint's torque): {reason}. To predict torque, use "
+        "`irb140 predict`."
         for name, slide, g, t in zip(robot.joint_names, robot.is_slide, gap, torque, strict=True)
         if g > NOTABLE_GAP * t > 0.0
     ]
@@ -78,25 +83,27 @@ def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
     out = []
     _, _, own = ex.prediction()
     for j, setting in enumerate(ex.settings):
-        alike = (*ex.settings[:j], (*setting[:SLOPE], 0, *setting[SLOPE + 1 :]), *ex.settings[j + 1 :])
+        one_level = (*setting[:FRICTION_LEVELS], 0, *setting[FRICTION_LEVELS + 1 :])
+        alike = (*ex.settings[:j], one_level, *ex.settings[j + 1 :])
         gain = ex.space.log_evidence(ex.chosen, ex.settings) - ex.space.log_evidence(ex.chosen, alike)
-        slopes = ex.extra[0].groups[j] == SLOPE
-        if slopes.any() and gain > -np.log(RARE):
+        levels = ex.extra[0].groups[j] == FRICTION_LEVELS
+        if levels.any() and gain > -np.log(RARE):
             unit = "N" if ex.lib.robot.is_slide[j] else "N m"
-            each = (own[j] * ex.extra[0].units[j])[slopes]
+            each = (own[j] * ex.extra[0].units[j])[levels]
             said = ", ".join(f"{x:+.3g} {unit} in {name}" for x, name in zip(each, names, strict=True))
-            out.append(f"Friction of {ex.lib.robot.joint_names[j]} differs between the recordings: {said}.")
+            joint = ex.lib.robot.joint_names[j]
+            out.append(f"The dry friction of {joint} differs between the recordings; relative to their mean: {said}.")
     return out
 
 
 def discrepancy_notes(robot: Robot, proof: HeldOut) -> list[str]:
-    """A note where the corrected model holds torque without a name."""
+    """A note where the corrected model holds torque that no effect explains."""
     joints = [name for name, carried in zip(robot.joint_names, proof.carried, strict=True) if carried]
     if not joints:
         return []
     return [
-        f"On {', '.join(joints)} the corrected model adds a function of the joint's own motion that no effect names, "
-        "because it makes the error on unseen motions smaller. `irb140 predict` holds it; corrected.xml and "
+        f"On {', '.join(joints)} the corrected model adds torque that no effect explains, as a function of the joint's "
+        "own motion, because this lowers the error on unseen motions. `irb140 predict` includes it; corrected.xml and "
         "load_corrected do not."
     ]
 

@@ -22,7 +22,6 @@ class Stretch:
             units of their prior at relative standard deviation 1.
         y: What the columns should add up to, (R, n): logged minus nominal torque, and what the last explanation says of
             products of its unknowns; see `tangent`.
-        bare: Whether X and y are of the rigid body as it is, without what the last explanation makes of it.
         rigid: Columns of the inertials under the model's own gravity and before the log, (R, n, 10 n).
         tau: Logged torque, low-passed, (R, n).
         nominal: Nominal torque, low-passed, (R, n).
@@ -38,7 +37,6 @@ class Stretch:
     begin: float
     X: np.ndarray
     y: np.ndarray
-    bare: bool
     rigid: np.ndarray
     tau: np.ndarray
     nominal: np.ndarray
@@ -56,7 +54,7 @@ class Stretch:
         """With nothing but these columns, all of inertials, as they are without any explanation."""
         k = self.rigid.shape[-1]
         own = np.where(columns < k, columns, columns - (self.X.shape[-1] - k))
-        return dataclasses.replace(self, X=self.rigid[..., own], y=self.tau - self.nominal, bare=True)
+        return dataclasses.replace(self, X=self.rigid[..., own], y=self.tau - self.nominal)
 
 
 def stretch(
@@ -92,7 +90,7 @@ def stretch(
     nominal, tau = band.apply(nominal), band.apply(recording.tau)
     y = tau - band.apply(base) + band.apply(twice)
     return Stretch(
-        index, recording.t[kept], recording.began, X, y, Y is upright, rigid, tau, nominal, recording.unsure[kept],
+        index, recording.t[kept], recording.began, X, y, rigid, tau, nominal, recording.unsure[kept],
         recording.usable[kept], recording.q[kept], recording.qd[kept], recording.qdd[kept],
         np.asarray(along.rigid.tool)[kept], np.asarray(along.rigid.tool_jacobian)[kept], recording.motion,
         recording.repeats,

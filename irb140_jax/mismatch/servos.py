@@ -1,4 +1,4 @@
-"""What a diagnosis of servo logs must say beside its findings: which classes an error of the drive falls into."""
+"""What a diagnosis of servo logs says beside its findings: which errors of the drive look like a finding."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -15,14 +15,14 @@ from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.recordings.condition import INEXACT, Commanded, Conditioned
 from irb140_jax.recordings.recording import Recording
 
-LATE = len(FIXED) + NAMES.index("command")
-DAMPER = len(FIXED) + NAMES.index("kd")
-NOTABLE = 1e-3  # s, by which commands must be late to be worth a note
+COMMAND_DELAY = len(FIXED) + NAMES.index("command")
+DRIVE_KD = len(FIXED) + NAMES.index("kd")
+NOTABLE_DELAY = 1e-3  # s, of commands, from which it is worth a note
 LAGS = ("actuator_lag", "time_delay", "channel_skew")  # effects that a late command can't be told from
 
 
 def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
-    """The explanation without effects smaller than a servo's torque is sure to be what its law says, at every joint."""
+    """The explanation without effects that are smaller at every joint than the error of a servo law."""
     if servo is None:
         return ex
     post = ex.posterior()
@@ -38,7 +38,7 @@ def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
 
 
 def with_useful_discrepancy(
-    model: CorrectedModel, smooth: Sequence[Conditioned], laws: Sequence[np.ndarray]
+    model: CorrectedModel, smooth: Sequence[Conditioned], without: Sequence[np.ndarray]
 ) -> tuple[CorrectedModel, list[str]]:
     """The model without a discrepancy on joints where its torque is worse with it, and a note if there are such.
 
@@ -48,12 +48,12 @@ def with_useful_discrepancy(
     Args:
         model: The corrected model.
         smooth: The recordings that it was found in.
-        laws: Torque of the same without discrepancy along them, low-passed, (R, n) each.
+        without: Torque of the same model without discrepancy along them, low-passed, (R, n) each.
     """
     if model.discrepancy is None:
         return model, []
     band, squares = model.band, np.zeros((2, model.robot.n))
-    for r, plain in zip(smooth, laws, strict=True):
+    for r, plain in zip(smooth, without, strict=True):
         rows = band.kept(len(r.t))
         tau, both = band.apply(r.tau), (plain, band.apply(torques_along(model, r).corrected))
         squares += [np.sum(np.where(r.usable[rows], tau - x, 0.0) ** 2, axis=0) for x in both]
@@ -63,7 +63,10 @@ def with_useful_discrepancy(
     coefficients = np.where(worse[:, None], 0.0, model.discrepancy.coefficients)
     kept = dataclasses.replace(model.discrepancy, coefficients=coefficients)
     names = ", ".join(name for name, bad in zip(model.robot.joint_names, worse, strict=True) if bad)
-    said = f"On {names} no function without a name is added in `irb140 predict`: with the model's loads it is worse."
+    said = (
+        f"On {names} `irb140 predict` adds no torque that no effect explains: with the loads of the corrected model it "
+        "would make the error larger."
+    )
     return dataclasses.replace(model, discrepancy=kept if kept.coefficients.any() else None), [said]
 
 
@@ -75,7 +78,7 @@ def _rms(torque: Sequence[np.ndarray], ex: Explanation) -> np.ndarray:
 
 
 def of_servos(ex: Explanation, servo: Commanded | None, found: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Findings of servo logs, each with what an error of the drive's gains or clock would look like in its place."""
+    """Findings of servo logs, each with the errors of the drive's gains or clock that would look the same."""
     if servo is None:
         return found
     out, names = [], list(ex.lib.robot.joint_names)
@@ -83,27 +86,31 @@ def of_servos(ex: Explanation, servo: Commanded | None, found: list[dict[str, An
         said = ""
         if f["effect"] == "viscous_friction":
             j = names.index(f["joints"][0])
-            off = float(servo.drive.kd_width[j] * _own(ex, j)[0][DAMPER])
+            off = float(servo.drive.kd_width[j] * _joint_nuisances(ex, j)[0][DRIVE_KD])
             both = f["parameters"]["viscous"]["value"] + float(servo.drive.kd[j]) + off
             said = (
-                f" It is one class with the drive's Kd, taken as {servo.drive.kd[j]:.3g}: what is known is the sum of "
-                f"both, {both:.3g}; two Kd, or an unpowered motion, would tell them apart."
+                f" It can't be told from the drive's Kd, which is taken as {servo.drive.kd[j]:.3g}: only the sum of "
+                f"both, {both:.3g}, is known; recordings with two different Kd, or of unpowered motion, would tell "
+                "them apart."
             )
         elif f["effect"] == "torque_gain":
-            said = " On a servo this is an error of the stated Kp, or of the masses that it is compared with."
+            said = " On a servo this means that the stated Kp is wrong, or that the masses of the model are."
         elif f["effect"] in LAGS:
             said = (
-                " Where it sits can't be told from the fit: a command that is taken up late, a lag of the drive's "
-                "torque and clocks out of step are one class here."
+                " The fit can't tell its cause: the drive may apply commands late, its torque may lag, or the clocks "
+                "may be out of step."
             )
         elif f["effect"] == "rotor_inertia":
-            said = " A command that is taken up late changes this number: it moves with the torque's phase."
+            said = (
+                " This number depends on how late the drive applies its commands, because a delay shifts the torque's "
+                "phase."
+            )
         out.append(f | {"certain": f["certain"] + said})
     return out
 
 
 def command_notes(ex: Explanation, servo: Commanded | None) -> list[str]:
-    """A note for every servo that takes up its commands late, or whose torque lags as much.
+    """A note for every servo that applies its commands late, or whose torque lags as much.
 
     Its odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
     any rare effect.
@@ -112,21 +119,21 @@ def command_notes(ex: Explanation, servo: Commanded | None) -> list[str]:
         return []
     out = []
     for j in range(ex.lib.robot.n):
-        own, spread = (x[LATE] for x in _own(ex, j))
+        own, spread = (x[COMMAND_DELAY] for x in _joint_nuisances(ex, j))
         odds = stats.norm.logpdf(0.0) - stats.norm.logpdf(0.0, own, spread) + np.log(RARE)
-        if odds > 0.0 and abs(servo.delay_width * own) > NOTABLE:
+        if odds > 0.0 and abs(servo.delay_width * own) > NOTABLE_DELAY:
             late, width = 1e3 * servo.delay_width * own, 1e3 * servo.delay_width * spread
             way = "late" if own > 0 else "early"
             out.append(
-                f"Commands of {ex.lib.robot.joint_names[j]} act {abs(late):.2g} +- {width:.1g} ms {way}; this is taken "
-                "into account. Whether the command is taken up late, the drive's torque lags, or the clocks are out of "
-                "step can't be told from the fit."
+                f"Commands of {ex.lib.robot.joint_names[j]} act {abs(late):.2g} +- {width:.1g} ms {way}; the fit takes "
+                "this into account. It can't tell whether the drive applies its commands late, its torque lags, or the "
+                "clocks are out of step."
             )
     return out
 
 
-def _own(ex: Explanation, j: int) -> tuple[np.ndarray, np.ndarray]:
-    """A joint's own nuisance parameters in prior standard deviations, and how sure they are."""
+def _joint_nuisances(ex: Explanation, j: int) -> tuple[np.ndarray, np.ndarray]:
+    """A joint's nuisance parameters and their standard deviations, both in prior standard deviations."""
     mean, _ = ex.space.posterior(ex.chosen, ex.settings)
     columns, setting = ex.space.set_columns(ex.chosen), ex.settings[j]
     own = ex.space.own(j, setting, columns, mean, instrument=True)
@@ -139,8 +146,9 @@ def servo_sentence(recordings: Sequence[Recording]) -> str:
     if not drives:
         return ""
     guessed = [name for name, said in zip(recordings[0].joint_names, drives[0].said, strict=True) if said == "estimate"]
-    unit = f"; on {', '.join(guessed)} Kp is estimated, so torque is in units of it" if guessed else ""
+    unit = f" On {', '.join(guessed)} Kp is estimated, so torques are in units of that Kp." if guessed else ""
     return (
-        f" No torque was logged: it is that of the servos, Kp (qdes - q) - Kd qd{unit}. Names found in such logs are "
-        "less sure than their probabilities say: on real servos several of them were wrong (docs/real-machines.md)."
+        f" No torque was logged; it was computed by the law of the servos, Kp (qdes - q) - Kd qd.{unit} Effects found "
+        "in such logs are less certain than their probabilities say: on real servos several of them were wrong "
+        "(docs/real-machines.md)."
     )

@@ -122,7 +122,7 @@ def undecided(
         site = tuple(names.index(j) for j in f["joints"])
         at = next(c for c in physics if _key(ex.data.candidates[c]) == (f["effect"], site))
         for a in f["alternatives"]:
-            rival = _rival(ex, at, a["effect"], loose)
+            rival = _rival(ex, at, a["effect"])
             if rival:
                 pairs.append((site, f["effect"], a["effect"], a["probability"], at, rival))
     beside = lambda at: table.of(c for c in physics if c != at)  # noqa: E731
@@ -196,7 +196,7 @@ def _key(c: Candidate) -> tuple[str, tuple[int, ...]]:
     return c.slug, c.joints
 
 
-def _rival(ex: Explanation, at: int, slug: str, loose: tuple[int, ...]) -> tuple[int, ...] | None:
+def _rival(ex: Explanation, at: int, slug: str) -> tuple[int, ...] | None:
     """The likeliest set with another effect in a finding's place, a special case of the finding beside it or not."""
     c = ex.data.candidates[at]
     rest = tuple(x for x in ex.chosen if x != at)

@@ -220,7 +220,7 @@ def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
     for _, own in features:
         phi[row : row + len(own), column : column + own.shape[1]] = own
         row, column = row + len(own), column + own.shape[1]
-    return Competitor("time, more than any motion", phi, np.concatenate(folds), False)
+    return Competitor("time more than on the motion", phi, np.concatenate(folds), False)
 
 
 def predicted(c: Competitor, Y: np.ndarray) -> np.ndarray:

@@ -12,8 +12,9 @@ from irb140_jax.mismatch.prove import HeldOut
 from irb140_jax.mismatch.unknown import Unexplained
 from irb140_jax.robot import Robot
 
-NO_BETTER = np.log(100.0)  # log odds that refitted inertials need over the nominal ones
-NOTABLE_SHIFT = 3.0  # standard deviations by which a link's inertials must move to be worth a sentence
+CLEARLY_BETTER = np.log(100.0)  # log odds that refitted inertials need over the nominal ones
+NOTABLE_SHIFT = 3.0  # standard deviations by which a link's inertials must change to be worth a sentence
+WRONG_INERTIALS = "wrong beyond their stated uncertainty"  # in sentences that the summary repeats
 
 
 def verdict(
@@ -21,18 +22,18 @@ def verdict(
 ) -> str:
     """The contract's verdict.
 
-    `unexplained` where nothing is named, or where more is left unnamed than was named.  `undecided` where a joint can't
-    be told of, and nothing is named elsewhere, nor takes more off such a joint's error than is left there; beside
-    names that is a note.
+    `unexplained` where structure is left and nothing is named, or where the structure left on a joint is larger than
+    what was named there.  `undecided` where a joint is open, unless a finding is on a joint that is not open, or
+    removes more of an open joint's error than is left there: then the open joints are a note.
     """
     nominal, refit, corrected = (proof.rmse(x) for x in (proof.nominal, proof.refit, proof.corrected))
     named = np.sqrt(np.clip(nominal**2 - corrected**2, 0.0, None))
     names = ex.lib.robot.joint_names
     at = {names.index(joint) for finding in found for joint in finding["joints"]}
-    told = any(j not in open_ or refit[j] ** 2 > 2.0 * corrected[j] ** 2 for j in at)
+    decided = any(j not in open_ or refit[j] ** 2 > 2.0 * corrected[j] ** 2 for j in at)
     if any(not found or u.rms > named[u.joint] for u in rest):
         return "unexplained"
-    if open_ and not told:
+    if open_ and not decided:
         return "undecided"
     if found:
         return "physics_left_out"
@@ -47,11 +48,11 @@ def _inertials_matter(ex: Explanation) -> bool:
     every = space.with_y(np.concatenate([instrument, np.arange(space.inertials)]))
     H = space.gram(ex.settings, every, every)
     left, _ = eliminated(H, np.arange(len(instrument)))
-    return gain_of(left, len(instrument) + np.arange(space.inertials)) > NO_BETTER
+    return gain_of(left, len(instrument) + np.arange(space.inertials)) > CLEARLY_BETTER
 
 
 def inertial_views(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
-    """How far each link's inertials moved, in standard deviations of their stated uncertainty, with a sentence.
+    """How far each link's inertials changed, in standard deviations of their stated uncertainty, with a sentence.
 
     A torque does not show a link's mass but sums over links (base parameters); so a sentence says by what torque the
     refitted inertials differ, and a mass is given only where the data know it, of a body that can be.
@@ -71,11 +72,14 @@ def inertial_views(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         sentence = ""
         if k in loose:
             sentence = (
-                f"Inertials from the link behind {name} on are wrong beyond their stated {100 * uncertainty:.3g} %: "
-                f"refitted, they change the torque of {_what_moved(robot, ex, dphi, k)}."
+                f"From the link behind {name} onwards, inertial parameters are {WRONG_INERTIALS} of "
+                f"{100 * uncertainty:.3g} %: refitting them changes the torque of {_torque_change(robot, ex, dphi, k)}."
             )
         elif shift > NOTABLE_SHIFT:
-            sentence = f"The link behind {name} moved by {shift:.1f} standard deviations of the stated uncertainty."
+            sentence = (
+                f"Refitting changes the inertial parameters of the link behind {name} by {shift:.1f} standard "
+                "deviations of their stated uncertainty."
+            )
         out.append({
             "link": name, "shift_sigma": shift, "mass_nominal": float(robot.mass[k]),
             "mass_refit": float(possible[k, 0]) if known[k] and k not in loose else None, "sentence": sentence,
@@ -94,8 +98,8 @@ def _masses_known(ex: Explanation, cov: np.ndarray) -> np.ndarray:
     return after < 0.25 * np.maximum(before, 1e-300)
 
 
-def _what_moved(robot: Robot, ex: Explanation, dphi: np.ndarray, k: int) -> str:
-    """By what torque the inertials changed from a link on, at the joints where that is most of the change."""
+def _torque_change(robot: Robot, ex: Explanation, dphi: np.ndarray, k: int) -> str:
+    """Torque by which inertials changed from a link onwards, in words, at the joints where it changes most."""
     theta = np.linalg.lstsq(ex.factor, dphi, rcond=1e-9)[0]
     theta[: 10 * k] = 0.0
     change = [s.rigid @ theta for s in ex.data.stretches]
@@ -111,12 +115,12 @@ def _what_moved(robot: Robot, ex: Explanation, dphi: np.ndarray, k: int) -> str:
 
 
 def unexplained_entry(robot: Robot, u: Unexplained) -> dict[str, Any]:
-    """The contract's entry for structure without a name."""
+    """The contract's entry for structure that no effect explains."""
     name = robot.joint_names[u.joint]
     unit = "N" if robot.is_slide[u.joint] else "N m"
     return {
         "joints": [name],
-        "where": f"{name}: {u.rms:.3g} {unit} RMS that follow {u.variable} and that no effect explains",
+        "where": f"{name}: {u.rms:.3g} {unit} RMS that no effect explains; it depends on {u.variable}",
         "share": u.share,
         "p_value": u.p_value,
     }
@@ -126,37 +130,42 @@ def summary(
     kind: str, found: list[dict[str, Any]], rest: list[Unexplained], fit: dict[str, Any],
     inertials: list[dict[str, Any]], robot: Robot, sources: list[str], missing: list[str],
 ) -> str:  # fmt: skip
-    """A short paragraph for a person; `missing` are sentences on what is too little to decide by."""
+    """A short paragraph for a person; `missing` are sentences on the data that a decision would need."""
     what = f"{len(sources)} recording{'s' if len(sources) != 1 else ''} of {robot.n} joint{'s' if robot.n != 1 else ''}"
+    show = f"{what} show{'s' if len(sources) == 1 else ''}"
     parts = {
         "no_mismatch": (
-            f"The model explains {what} to what the sensors scatter by; nothing is left out that this motion could "
-            "show."
+            f"The model explains {what} down to the noise of the sensors; this motion shows nothing that it leaves out."
         ),
         "parameters_only": (
-            f"Nothing is left out that {what} could show: refitted inertial parameters explain the torque."
+            f"Refitted inertial parameters explain the torque of {what}; this motion shows no physics that the model "
+            "leaves out."
         ),
-        "physics_left_out": f"The model leaves physics out of {what}.",
-        "undecided": f"{what[0].upper()}{what[1:]} can't tell whether the model leaves anything out.",
-        "unexplained": f"The model leaves out structure in {what} that no effect of the library explains.",
+        "physics_left_out": f"{show} physics that the model leaves out.",
+        "undecided": f"{what} can't tell whether the model leaves anything out.",
+        "unexplained": f"{show} structure in the torque that neither the model nor any effect of the library explains.",
     }
     said = [parts[kind]]
     if kind == "undecided":
-        said += [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing]
+        said += [f"{_capital(sentence)}." for sentence in missing]
     by_effect: dict[str, list[str]] = {}
     for f in found:
-        by_effect.setdefault(f["effect"], []).append(
-            " and ".join(f["joints"]) if len(f["joints"]) > 1 else f["joints"][0]
-        )
-    for effect, joints in by_effect.items():
-        said.append(f"{CATALOGUE[effect].title.capitalize()} on {_listed(joints)}.")
-    undecided = [f for f in found if f["alternatives"]]
-    for f in undecided:
-        rivals = _listed([CATALOGUE[a["effect"]].title for a in f["alternatives"]], "or")
-        said.append(f"On {_listed(f['joints'])} the data can't rule out {rivals} instead of it or of a part of it.")
-    said += [i["sentence"] for i in inertials if i["sentence"] and "beyond" in i["sentence"]]
+        by_effect.setdefault(f["effect"], []).append(_listed(f["joints"]))
+    for effect, places in by_effect.items():
+        one_joint_each = all(len(f["joints"]) == 1 for f in found if f["effect"] == effect)
+        where = f"on {_listed(places)}" if one_joint_each else _listed([f"on {place}" for place in places])
+        said.append(f"{_capital(CATALOGUE[effect].title)} {where}.")
+    for f in found:
+        if f["alternatives"]:
+            title, joints = CATALOGUE[f["effect"]].title, _listed(f["joints"])
+            rivals = _listed([CATALOGUE[a["effect"]].title for a in f["alternatives"]], "or")
+            said.append(
+                f"{_capital(title)} on {joints} may instead be {rivals}, in whole or in part; these data can't tell."
+            )
+    said += [i["sentence"] for i in inertials if WRONG_INERTIALS in i["sentence"]]
     if rest and kind != "unexplained":
-        said.append(f"Something without a name is left on {_listed([robot.joint_names[u.joint] for u in rest])}.")
+        joints = _listed([robot.joint_names[u.joint] for u in rest])
+        said.append(f"On {joints} structure is left in the torque that no effect of the library explains.")
     judged = [j for j in fit if fit[j]["noise_floor"] is not None]
     concerned = [j for f in found for j in f["joints"] if j in judged] or judged
     before = "rmse_refit" if found else "rmse_nominal"
@@ -164,11 +173,16 @@ def summary(
     f = fit[worst]
     unit = "N" if robot.is_slide[robot.joint_names.index(worst)] else "N m"
     said.append(
-        f"On unseen data the error of {worst} goes from {f['rmse_nominal']:.3g} {unit} (model as given) over "
-        f"{f['rmse_refit']:.3g} (inertials refitted) to {f['rmse_corrected']:.3g}; the sensors scatter by "
-        f"{f['noise_floor']:.3g}."
+        f"On unseen data the torque error of {worst} is {f['rmse_nominal']:.3g} {unit} RMS with the model as given, "
+        f"{f['rmse_refit']:.3g} with refitted inertials and {f['rmse_corrected']:.3g} with the corrected model; the "
+        f"noise of the sensors is {f['noise_floor']:.3g}."
     )
     return " ".join(said)
+
+
+def _capital(words: str) -> str:
+    """The words with a capital first letter; names in them keep theirs."""
+    return f"{words[0].upper()}{words[1:]}"
 
 
 def _listed(words: list[str], last: str = "and") -> str:

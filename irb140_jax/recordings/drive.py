@@ -105,6 +105,7 @@ def drive_of_map(columns: ColumnMap, joints: tuple[str, ...], otherwise: Drive |
             if float(value) == 0.0 and section in ("kp", "torque_limit"):
                 raise RecordingError(f"{columns.source}: [{section}] {channel.partition('.')[2]} = 0; allowed is a "
                                      "positive number in SI units on the joint side")
+
     def at(section: str, old: np.ndarray) -> np.ndarray:
         new = [given[section].get(f"qdes.{joint}") for joint in joints]
         return np.array([float(x if y is None else y) for x, y in zip(old, new, strict=True)])

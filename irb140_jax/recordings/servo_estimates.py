@@ -70,9 +70,17 @@ def rows_of_joints(
             other = np.stack([qd, np.tanh(qd / slow), seen.qdd[:, j], one, -one], axis=1)
             error = np.stack([x[use, j] for x in late])
             parts[j].append(Rows(total[use, j], other[use], error, np.full(int(use.sum()), d.kp[j])))
-    along = Rows(0, 0, 1, 0)  # pyright: ignore[reportArgumentType]: the axis of the rows in each field
-    together = lambda x, axis: np.concatenate(x, axis=axis)  # noqa: E731
-    return [Rows(*map(together, zip(*joint, strict=True), along)) for joint in parts]
+    return [_joined(joint) for joint in parts]
+
+
+def _joined(parts: Sequence[Rows]) -> Rows:
+    """Rows of one joint, those of each recording behind those of the one before."""
+    return Rows(
+        model=np.concatenate([part.model for part in parts]),
+        other=np.concatenate([part.other for part in parts]),
+        error=np.concatenate([part.error for part in parts], axis=1),
+        kp=np.concatenate([part.kp for part in parts]),
+    )
 
 
 def _later(r: Recording, d: Drive, delay: float) -> np.ndarray:

@@ -30,7 +30,7 @@ class Results:
     Attributes:
         folder: Where the files shall be.
         name: Of the file, where it is one, links followed; else empty.
-        desk: An empty folder for whatever is needed meanwhile; it vanishes in the end.
+        workspace: An empty folder for intermediate files; it is removed at the end.
         kept: Files of the user that stood in the way, and what they are called now.
         misplaced: Why and where the result is elsewhere; None if all is well.
     """
@@ -43,14 +43,14 @@ class Results:
         name = names[0] if names else ""
         self.folder, self.name, self._owned, self._command = folder, name, owned, command
         self._scratch = pathlib.Path(tempfile.mkdtemp(prefix=SCRATCH, dir=folder))
-        self.desk = self._scratch / "desk"
+        self.workspace = self._scratch / "workspace"
         self.kept: list[tuple[pathlib.Path, pathlib.Path]] = []
         self.misplaced: str | None = None
         self._stuck = False  # whether files of a former run could not be put back
         try:
-            self.desk.mkdir()
+            self.workspace.mkdir()
             for file in names:
-                _rehearse(folder / file, self.desk)
+                _rehearse(folder / file, self.workspace)
             self._reserve = _reserved(self._scratch)
         except BaseException:
             shutil.rmtree(self._scratch, ignore_errors=True)
@@ -139,9 +139,9 @@ class Results:
         return other / "result"
 
 
-def _rehearse(file: pathlib.Path, desk: pathlib.Path) -> None:
+def _rehearse(file: pathlib.Path, workspace: pathlib.Path) -> None:
     """Raise if no file can have this name, or if the file that has it can't be moved out of the way."""
-    trial = desk / file.name
+    trial = workspace / file.name
     trial.touch()
     trial.unlink()
     if file.is_file() and not file.is_symlink():

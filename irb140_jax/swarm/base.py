@@ -36,6 +36,7 @@ class Clock(NamedTuple):
         """Share of the iterations done, t/T."""
         return jnp.asarray(self.iteration, float) / self.iterations
 
+
 S = TypeVar("S", bound="Swarm")  # typing.Self would stop the check of shapes at import
 
 

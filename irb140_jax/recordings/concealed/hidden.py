@@ -96,6 +96,7 @@ class Survey(NamedTuple):
         """Whether the joint is prismatic."""
         return bool(self.model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE)
 
+
 H = TypeVar("H", bound="Hidden")  # typing.Self would stop the check of shapes at import
 
 

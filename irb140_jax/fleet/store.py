@@ -1,9 +1,9 @@
-"""Where many diagnoses lie, so that a run which is killed at any moment can be gone on with.
+"""The folder that stores the results of many units, so that a run killed at any moment can be resumed.
 
 OUT/diagnoses/<unit>/   a whole diagnosis, moved there in one step
 OUT/rows/<unit>.json    its row, written after that
 OUT/table.parquet, OUT/index.html    all rows
-OUT/.irb140-*           what a run needs meanwhile; what a killed run left of it is removed by the next one
+OUT/.irb140-*           unfinished results of a run; the next run removes those of a killed one
 """
 
 import contextlib
@@ -34,17 +34,17 @@ FORMER, LOCK = "former-", f"{SCRATCH}lock"
 LONG_AGO = 60.0  # [s]
 
 
-class Shelf:
-    """The folder of results while a run has it open, see `shelf`.
+class ResultsStore:
+    """The folder of the results of many units while a run has it open, see `results_store`.
 
     Attributes:
         out: The folder.
-        desk: For what is not finished; vanishes in the end, and at the beginning of the next run after a kill.
+        workspace: Folder for unfinished results; removed at the end, or by the next run after a kill.
         settings: Whatever else than its files a row depends on.
     """
 
-    def __init__(self, out: pathlib.Path, desk: pathlib.Path, settings: Mapping[str, Any]):
-        self.out, self.desk = out, desk
+    def __init__(self, out: pathlib.Path, workspace: pathlib.Path, settings: Mapping[str, Any]):
+        self.out, self.workspace = out, workspace
         self.settings = _digest(json.dumps({"schema": SCHEMA, **settings}, sort_keys=True))
 
     def key(self, unit: Unit) -> str:
@@ -81,12 +81,12 @@ class Shelf:
             unit: The unit.
             key: Its key before it was diagnosed.
             row: The row.
-            fresh: Folder of the diagnosis, on the desk.
+            fresh: Folder of the diagnosis, in the workspace.
         """
-        place, former = self.folder(unit.name), self.desk / f"{FORMER}{unit.name}"
+        place, former = self.folder(unit.name), self.workspace / f"{FORMER}{unit.name}"
         self._row_file(unit.name).unlink(missing_ok=True)  # of a former diagnosis, which is about to go
         if place.exists():
-            fresh = fresh or self.desk / "kept"
+            fresh = fresh or self.workspace / "kept"
             fresh.mkdir(exist_ok=True)
             _keep_foreign(place, fresh)
             place.rename(former)
@@ -95,16 +95,16 @@ class Shelf:
         shutil.rmtree(former, ignore_errors=True)
         whole = {"settings": self.settings, "key": key, **row}
         text = json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-        _write_whole(self._row_file(unit.name), text, self.desk)
+        _write_whole(self._row_file(unit.name), text, self.workspace)
 
     def _row_file(self, name: str) -> pathlib.Path:
         return self.out / "rows" / f"{name}.json"
 
 
 @contextlib.contextmanager
-def shelf(
+def results_store(
     out: pathlib.Path, part: str, settings: Mapping[str, Any], inputs: Iterable[pathlib.Path] = ()
-) -> Iterator[Shelf]:
+) -> Iterator[ResultsStore]:
     """Open a folder of results for one part of the units.
 
     Args:
@@ -120,25 +120,25 @@ def shelf(
         if read_manifest(results.folder) is None:
             results.write(lambda folder: None)  # only the mark that the folder is ours
     out = results.folder
-    desk = out / f"{SCRATCH}part-{part.replace('/', '-of-')}"
+    workspace = out / f"{SCRATCH}part-{part.replace('/', '-of-')}"
     for left in out.glob(f"{SCRATCH}part-*"):
         with _locked(left) as free:
             if free:
                 _clear(left, out / "diagnoses")
     _sweep(out)
-    for folder in (out / "diagnoses", out / "rows", desk):
+    for folder in (out / "diagnoses", out / "rows", workspace):
         folder.mkdir(exist_ok=True)
-    with _locked(desk) as free:
+    with _locked(workspace) as free:
         if not free:
             raise InputError(f"--out {out}: another run works on part {part} there; wait for it, or stop it")
         try:
-            yield Shelf(out, desk, settings)
+            yield ResultsStore(out, workspace, settings)
         finally:
-            shutil.rmtree(desk, ignore_errors=True)
+            shutil.rmtree(workspace, ignore_errors=True)
 
 
 @contextlib.contextmanager
-def alone(out: pathlib.Path) -> Iterator[None]:
+def only_writer(out: pathlib.Path) -> Iterator[None]:
     """Wait until no other run writes the table, and let none meanwhile."""
     lock = out / LOCK
     lock.touch()
@@ -163,19 +163,19 @@ def _locked(path: pathlib.Path, *, wait: bool = False) -> Iterator[bool]:
         os.close(number)
 
 
-def _write_whole(path: pathlib.Path, text: str, desk: pathlib.Path) -> None:
-    fresh = desk / path.name
+def _write_whole(path: pathlib.Path, text: str, workspace: pathlib.Path) -> None:
+    fresh = workspace / path.name
     fresh.write_text(text, encoding="utf-8")
     os.replace(fresh, path)
 
 
-def _clear(desk: pathlib.Path, diagnoses: pathlib.Path) -> None:
+def _clear(workspace: pathlib.Path, diagnoses: pathlib.Path) -> None:
     """Remove what a killed run left; a former diagnosis that it was about to replace goes back."""
-    for former in desk.glob(f"{FORMER}*"):
+    for former in workspace.glob(f"{FORMER}*"):
         place = diagnoses / former.name.removeprefix(FORMER)
         if not place.exists():
             former.rename(place)
-    shutil.rmtree(desk, ignore_errors=True)
+    shutil.rmtree(workspace, ignore_errors=True)
 
 
 def _sweep(out: pathlib.Path) -> None:

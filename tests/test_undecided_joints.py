@@ -1,0 +1,49 @@
+"""A joint is decided only with enough motion and a small remaining error."""
+
+import dataclasses
+
+import helpers_recordings as made
+import numpy as np
+import pytest
+
+from irb140_jax.mismatch import diagnose
+from irb140_jax.mismatch.prove import HeldOut
+from irb140_jax.mismatch.undecided_joints import undecidable
+from irb140_jax.recordings.low_pass import Band
+
+BAND = Band(20.0, 32.0, 200.0, 4)
+
+
+def proof(left: float, rows: int = 2000) -> HeldOut:
+    """Errors of this size on a joint, on so many rows."""
+    error = np.full((rows, 1), left)
+    return HeldOut([error], [error], [error], [error], [np.ones((rows, 1), dtype=bool)], np.zeros(1, dtype=bool))
+
+
+@pytest.mark.parametrize(
+    ("left", "rows", "scatter", "said"),
+    [
+        (0.05, 2000, 0.05, None),
+        (0.3, 2000, 0.3, None),  # loud sensors, but the model's torque stands above them
+        (0.09, 2000, 0.001, None),  # far above the sensors, and small
+        (0.3, 2000, 0.05, "6 times the noise of the sensors"),
+        (0.7, 2000, 0.7, "70 % of its torque"),
+        (0.05, 100, 0.05, "only 2 s"),
+    ],
+)
+def test_a_joint_is_told_of_by_enough_motion_and_a_small_residual(left, rows, scatter, said):
+    torque = np.sqrt(2.0) * np.sin(np.linspace(0.0, 20.0 * np.pi, rows, endpoint=False))[:, None]
+    sentences = undecidable(made.robot(pendulum=True), proof(left, rows), [torque], np.array([scatter]), BAND)
+    assert (not sentences) if said is None else said in sentences[0]
+
+
+def test_what_is_as_large_as_the_torque_is_no_verdict():
+    # Positions that belong to another arm: nothing of the model is in the torque.
+    robot, recordings = made.robot(pendulum=True), []
+    for seed in range(2):
+        one = made.recording(seed=seed, pendulum=True, speeds=False, rate=200.0, duration=10.0)
+        noise = np.random.default_rng(seed).normal(size=one.tau.shape)
+        recordings.append(dataclasses.replace(one, tau=one.tau.std() * noise))
+    diagnosis = diagnose(robot, recordings).diagnosis
+    assert diagnosis["verdict"] == "undecided" and "may hide anything" in diagnosis["summary"]
+    assert "record" in diagnosis["summary"]
