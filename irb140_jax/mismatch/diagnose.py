@@ -30,9 +30,10 @@ from irb140_jax.mismatch.selection.selected import NAMED
 from irb140_jax.mismatch.sensor_noise import coarse_positions, scatter_by_sensor
 from irb140_jax.mismatch.servos import (
     command_notes,
+    harmful_discrepancy,
+    harmful_notes,
     of_servos,
     servo_sentence,
-    with_useful_discrepancy,
     without_negligible,
 )
 from irb140_jax.mismatch.sufficient_data import comparable, too_little, usable_rows
@@ -148,9 +149,11 @@ def _diagnosed(
     laws = dataclasses.replace(model, discrepancy=None)  # which the file can't hold, as a note of its own says
     by_laws = [torques_along(laws, r).corrected for r in smooth]
     corrected = [band.apply(torque) for torque in by_laws]
-    if smooth[0].servo is not None:
-        model, harmful = with_useful_discrepancy(model, smooth, corrected)
-        servo_notes += harmful
+    if smooth[0].servo is not None and model.discrepancy is not None:
+        harmful = harmful_discrepancy(model, smooth, corrected)
+        servo_notes += harmful_notes(robot, harmful)
+        proof = proof.without_discrepancy(harmful)
+        model = dataclasses.replace(model, discrepancy=model.discrepancy.on(~harmful))
     lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
     beyond = beyond_file(model, smooth, by_laws)
     gap = None if beyond is None else native_gap(beyond, band)

@@ -59,6 +59,11 @@ class HeldOut:
         """Joints of which there are rows to judge by, shape (n,)."""
         return np.any([u.any(axis=0) for u in self.use], axis=0)
 
+    def without_discrepancy(self, joints: np.ndarray) -> "HeldOut":
+        """The same where some joints, shape (n,), carry no discrepancy."""
+        corrected = [np.where(joints, n, c) for n, c in zip(self.named, self.corrected, strict=True)]
+        return dataclasses.replace(self, corrected=corrected, carried=self.carried & ~joints)
+
     def rmse(self, residuals: list[np.ndarray]) -> np.ndarray:
         """RMS over the rows that count, shape (n,)."""
         squares = sum(np.sum(np.where(u, r, 0.0) ** 2, axis=0) for r, u in zip(residuals, self.use, strict=True))

@@ -14,6 +14,7 @@ from irb140_jax.mismatch.regression.servo import NAMES
 from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.recordings.condition import INEXACT, Commanded, Conditioned
 from irb140_jax.recordings.recording import Recording
+from irb140_jax.robot import Robot
 
 COMMAND_DELAY = len(FIXED) + NAMES.index("command")
 DRIVE_KD = len(FIXED) + NAMES.index("kd")
@@ -37,10 +38,10 @@ def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
     return dataclasses.replace(ex, chosen=tuple(kept))
 
 
-def with_useful_discrepancy(
+def harmful_discrepancy(
     model: CorrectedModel, smooth: Sequence[Conditioned], without: Sequence[np.ndarray]
-) -> tuple[CorrectedModel, list[str]]:
-    """The model without a discrepancy on joints where its torque is worse with it, and a note if there are such.
+) -> np.ndarray:
+    """Joints on which the model's torque is worse with its discrepancy than without, shape (n,).
 
     The fit may see another load than the model has: an error of the drive moves the inertials, and what bends with the
     load is then scaled wrongly.
@@ -50,24 +51,23 @@ def with_useful_discrepancy(
         smooth: The recordings that it was found in.
         without: Torque of the same model without discrepancy along them, low-passed, (R, n) each.
     """
-    if model.discrepancy is None:
-        return model, []
     band, squares = model.band, np.zeros((2, model.robot.n))
     for r, plain in zip(smooth, without, strict=True):
         rows = band.kept(len(r.t))
         tau, both = band.apply(r.tau), (plain, band.apply(torques_along(model, r).corrected))
         squares += [np.sum(np.where(r.usable[rows], tau - x, 0.0) ** 2, axis=0) for x in both]
-    worse = squares[1] > squares[0]
-    if not worse.any():
-        return model, []
-    coefficients = np.where(worse[:, None], 0.0, model.discrepancy.coefficients)
-    kept = dataclasses.replace(model.discrepancy, coefficients=coefficients)
-    names = ", ".join(name for name, bad in zip(model.robot.joint_names, worse, strict=True) if bad)
-    said = (
+    return squares[1] > squares[0]
+
+
+def harmful_notes(robot: Robot, harmful: np.ndarray) -> list[str]:
+    """A note where a joint's discrepancy is left out, see `harmful_discrepancy`."""
+    if not harmful.any():
+        return []
+    names = ", ".join(name for name, bad in zip(robot.joint_names, harmful, strict=True) if bad)
+    return [
         f"On {names} `irb140 predict` adds no torque that no effect explains: with the loads of the corrected model it "
         "would make the error larger."
-    )
-    return dataclasses.replace(model, discrepancy=kept if kept.coefficients.any() else None), [said]
+    ]
 
 
 def _rms(torque: Sequence[np.ndarray], ex: Explanation) -> np.ndarray:

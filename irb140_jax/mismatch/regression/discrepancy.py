@@ -51,6 +51,11 @@ class Discrepancy:
             out[:, j] = np.concatenate(features, axis=1) @ self.coefficients[j]
         return out
 
+    def on(self, joints: np.ndarray) -> "Discrepancy | None":
+        """The same on some joints alone, shape (n,); None where it is nothing there."""
+        kept = np.where(joints[:, None], self.coefficients, 0.0)
+        return dataclasses.replace(self, coefficients=kept) if kept.any() else None
+
     def to_json(self) -> dict[str, Any]:
         """Everything of it as JSON."""
         sizes = {k: np.asarray(v).tolist() for k, v in self.scales._asdict().items()}
