@@ -75,3 +75,16 @@ def test_what_is_correlated_with_the_inertials_moves_along():
     into = np.eye(size, size + 1)
     moved = of_bodies(np.append(mean, 2.0), wide, into, *arm()[1:])
     np.testing.assert_allclose(moved[-1] - 2.0, slope @ (moved[:-1] - mean), rtol=1e-6)
+
+
+def test_the_search_does_not_stay_where_an_impossible_estimate_meets_the_bounds():
+    _, phi, factor = arm()
+    wrist, of_wrist = phi[-1:], factor[-10:, -10:]
+    for seed in range(30):  # of which some would stay at a tenth of the nominal body's distance
+        rng = np.random.default_rng(seed)
+        told = rng.normal(size=(3, 10)) / 1e-3  # three sums of the inertials, three times what they are nominally
+        precision = np.eye(10) + told.T @ told
+        cov = np.linalg.inv(precision)
+        mean = cov @ told.T @ (3.0 * rng.normal(size=3) / 1e-3)
+        off = lambda x, mean=mean, precision=precision: float((x - mean) @ precision @ (x - mean))  # noqa: E731
+        assert off(of_bodies(mean, cov, np.eye(10), wrist, of_wrist)) < 1e-4 * off(np.zeros(10))

@@ -101,27 +101,27 @@ class JointGram:
         rows: Rows of each block, shape (B,).
         repeats: How many recordings there are of each block's motion, shape (B,).
         misfit: Share of the noise's variance, at level 1, that the sensors don't make.
+        keep: Which blocks count, shape (B,); all by default.
     """
 
     def __init__(
         self, index: np.ndarray, blocks: np.ndarray, groups: np.ndarray, rows: np.ndarray,
-        repeats: np.ndarray | None = None, misfit: float = 0.0,
+        repeats: np.ndarray | None = None, misfit: float = 0.0, keep: np.ndarray | None = None,
     ):  # fmt: skip
         self.index, self.blocks, self.groups, self.rows, self.misfit = index, blocks, groups, rows, misfit
         self.repeats = np.ones(len(blocks), dtype=int) if repeats is None else repeats
         least = np.sqrt(1.0 - misfit)  # no residual is quieter than the sensors
         self.lowest = int(np.searchsorted(LEVELS, least * (1.0 - 1e-9)))
-        self._totals = [(int(k), blocks[self.repeats == k].sum(axis=0), float(rows[self.repeats == k].sum()))
-                        for k in np.unique(self.repeats)]  # fmt: skip
-        self._once = (self._totals[0][1], self._totals[0][2]) if self._totals else (blocks.sum(axis=0), 0.0)
+        self.keep = np.ones(len(blocks), dtype=bool) if keep is None else keep
+        alike = {int(k): (self.keep & (self.repeats == k)).astype(float) for k in np.unique(self.repeats[self.keep])}
+        self._totals = [(k, np.tensordot(w, blocks, 1), float(w @ rows)) for k, w in alike.items()]
+        self._once = self._totals[0][1:] if self._totals else (np.zeros(blocks.shape[1:]), 0.0)
         self._kept: dict[tuple[Setting, bool], Integrated] = {}
 
     def without(self, blocks: np.ndarray) -> "JointGram":
         """The same without some blocks, shape (B,)."""
-        keep = ~blocks
-        return JointGram(
-            self.index, self.blocks[keep], self.groups, self.rows[keep], self.repeats[keep], self.misfit
-        )
+        keep = self.keep & ~blocks
+        return JointGram(self.index, self.blocks, self.groups, self.rows, self.repeats, self.misfit, keep)
 
     def weighted(self, level: float) -> tuple[np.ndarray, float]:
         """Sum of the blocks and their number of rows, each motion that was repeated by what its repeats are worth.
