@@ -173,7 +173,8 @@ def main() -> None:
     draws = {name: runner.read(runner.stored(name)) for name in ("final", "check", "work")}
     draws = {name: every for name, every in draws.items() if any(x["diagnosis"] for x in every)}
     # The file without a label is the last look.
-    files = sorted(runner.RESULTS.glob("testbed_check*.jsonl"), key=lambda path: (path.stem == "testbed_check", path.stem))
+    order = lambda path: (path.stem == "testbed_check", path.stem)  # noqa: E731
+    files = sorted(runner.RESULTS.glob("testbed_check*.jsonl"), key=order)
     looks = [runner.read(path) for path in files]
     for name, every in draws.items():
         diagram.draw([x for x in every if x["diagnosis"]], ROOT / "docs" / "figures" / f"calibration_{name}.svg")
