@@ -55,7 +55,13 @@ class AbstractDelay(AbstractEffect):
 
 
 def mean_slopes(t: jax.Array, rate: jax.Array, half: jax.Array) -> jax.Array:
-    """Mean of rates (T, k) at even times over twice a time from each instant on, shape (T, k)."""
+    """Mean of rates over a delay from each instant on, shape (T, k).
+
+    Args:
+        t: Evenly spaced times [s], shape (T,), two at least.
+        rate: Rates of k signals, shape (T, k).
+        half: Half of the delay [s]; below zero the mean is over the time before.
+    """
     later = half * (1.0 + NODES) / (t[1] - t[0])  # samples
     whole = jnp.floor(later)
     at = jnp.arange(len(t))[:, None] + whole.astype(int)

@@ -43,16 +43,23 @@ def inverse_dynamics(model: mujoco.MjModel, q: Vector, qd: Vector, qdd: Vector) 
     Returns:
         tau [N m or N], shape (n,).
     """
-    data = _data(model, q, qd)
-    data.qacc[:] = qdd
-    mujoco.mj_inverse(model, data)
-    return data.qfrc_inverse.copy()
+    return inverse_dynamics_along(model, *(np.asarray(x)[None] for x in (q, qd, qdd)))[0]
 
 
 def inverse_dynamics_along(
     model: mujoco.MjModel, q: Float[np.ndarray, "T n"], qd: Float[np.ndarray, "T n"], qdd: Float[np.ndarray, "T n"]
 ) -> Float[np.ndarray, "T n"]:
-    """Joint torques of a motion of T samples, `mj_inverse` [N m or N]; see `inverse_dynamics`."""
+    """Joint torques along T samples of a motion, `mj_inverse`; no sample knows of the others.
+
+    Args:
+        model: From `oracle_model`.
+        q: Joint positions [rad or m], shape (T, n).
+        qd: Joint velocities [rad/s or m/s], shape (T, n).
+        qdd: Joint accelerations [rad/s^2 or m/s^2], shape (T, n).
+
+    Returns:
+        tau [N m or N], shape (T, n).
+    """
     data, out = mujoco.MjData(model), np.empty(np.shape(qdd))
     for i, row in enumerate(zip(q, qd, qdd, strict=True)):
         data.qpos[:], data.qvel[:], data.qacc[:] = row

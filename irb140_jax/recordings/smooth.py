@@ -34,8 +34,8 @@ def without_noise(
     """Wiener's smoother: of all joints' positions, at every frequency, the part that is signal.
 
     What is optimal for q is so for its derivatives too.  Without it, encoder noise between the motion's highest
-    frequency and the band's would fill qdd.  Beyond its ends
-    a recording goes on as its own spectrum has it (`_goes_on`).
+    frequency and the band's would fill qdd.  Beyond its ends a recording goes on as its own spectrum has it
+    (`_goes_on`).
 
     Args:
         q: Positions on an even grid, shape (T, n).
