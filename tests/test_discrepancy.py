@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from irb140_jax.effects import Scales
-from irb140_jax.mismatch.regression.discrepancy import reversal_features, smooth_features
+from irb140_jax.mismatch.regression.discrepancy import features as blocks
 from irb140_jax.recordings.condition import Conditioned
 
 RATE = 200.0
@@ -18,7 +18,7 @@ SIGN = np.tanh(QD / 0.01)
 
 
 def features() -> np.ndarray:
-    """Both blocks along the motion, columns of RMS one, shape (T, 78)."""
+    """All blocks along the motion, columns of RMS one, shape (T, 78)."""
     column = lambda x: np.asarray(x)[:, None]  # noqa: E731
     motion = Conditioned(
         "motion", T, column(Q), column(QD), column(QDD), column(LOAD), np.ones((len(T), 1), bool), np.array([0.01]),
@@ -27,7 +27,7 @@ def features() -> np.ndarray:
     one = lambda x: np.array([x])  # noqa: E731
     scales = Scales(one(np.abs(QD).max()), one(0.01), one(np.sqrt(np.mean(LOAD**2))), one(Q.min()), one(Q.max()), 20.0,
                     one(0.3), one(0.0))  # fmt: skip
-    X = np.concatenate([f(motion, column(LOAD), scales, 0) for f in (smooth_features, reversal_features)], axis=1)
+    X = np.concatenate(blocks(motion, column(LOAD), scales, 0), axis=1)
     return X / np.sqrt(np.mean(X**2, axis=0))
 
 

@@ -21,7 +21,7 @@ class Data:
     Attributes:
         stretches: One per recording.
         scale: Prior standard deviation of each column's coefficient, shape (K,).
-        candidates: Library candidates followed by loose inertials of each link and of all of them.
+        candidates: Library candidates followed by loose inertials of each link.
         nuisances: Number of inertial columns (10 n).
     """
 
@@ -59,11 +59,8 @@ def assemble(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data
             typical[c.columns] = np.where(moves, np.min(typical[c.columns], where=moves, initial=np.inf), 0.0)
     scale = np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
     loose = LooseInertials()
-    alone = [(k,) for k in range(lib.robot.n)]
-    links = [*alone, tuple(range(lib.robot.n))] if lib.robot.n > 1 else alone
     extra = []
-    for joints in links:
-        columns = lib.size + np.concatenate([10 * k + np.arange(10) for k in joints])
-        free = np.full(len(columns), np.inf)
-        extra.append(Candidate(loose, joints, np.zeros(0), columns, tuple(range(len(columns))), -free, free))
+    for k in range(lib.robot.n):
+        columns, free = lib.size + 10 * k + np.arange(10), np.full(10, np.inf)
+        extra.append(Candidate(loose, (k,), np.zeros(0), columns, tuple(range(10)), -free, free))
     return Data(out, scale, (*lib.candidates, *extra), nuisances)

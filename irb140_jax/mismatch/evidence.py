@@ -100,10 +100,12 @@ class Posterior:
     cov: np.ndarray
 
 
-def posterior(H: np.ndarray, columns: np.ndarray, named: Sequence[slice] = ()) -> Posterior:
+def posterior(
+    H: np.ndarray, columns: np.ndarray, named: Sequence[slice] = (), prior: np.ndarray | None = None
+) -> Posterior:
     """Posterior of the given columns from a Gram matrix whose last column is y.
 
-    The prior is a unit one, which says what was to be expected before anything was found; but a named effect that comes
+    The prior says what was to be expected before anything was found; but a named effect that comes
     out larger gets one as wide as its largest amplitude.  Otherwise what it shares with the inertials would be theirs:
     a payload of twenty times the expected one would lose most of its mass to the links.
 
@@ -111,14 +113,16 @@ def posterior(H: np.ndarray, columns: np.ndarray, named: Sequence[slice] = ()) -
         H: The Gram matrix, in prior units.
         columns: Which of its columns.
         named: Amplitudes of each named effect, among `columns`.
+        prior: Standard deviations of the prior, in units of those that were stated; these by default.
     """
     G, b = H[np.ix_(columns, columns)], H[columns, -1]
-    width = np.ones(len(columns))
+    prior = np.ones(len(columns)) if prior is None else prior
+    width = prior
     for _ in range(WIDENINGS):
         wide = width[:, None] * width
         cov = wide * linalg.cho_solve((root(with_prior(wide * G)), True), np.eye(len(columns)))
         mean = cov @ b
-        last, width = width, np.ones(len(columns))
+        last, width = width, prior.copy()
         for part in named:
             width[part] = max(1.0, float(np.max(np.abs(mean[part]))))
         if np.allclose(width, last, rtol=0.01):

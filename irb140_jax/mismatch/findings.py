@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
@@ -11,7 +11,6 @@ from irb140_jax.mismatch.certain import certain
 from irb140_jax.mismatch.explanation import Explanation, parts
 from irb140_jax.mismatch.intervals import parameters_of
 from irb140_jax.mismatch.prove import held_out_gains
-from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
 from irb140_jax.mismatch.selection.selected import NAMED
 from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.mismatch.silent import SILENT
@@ -52,11 +51,9 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
 def torque_scale_odds(ex: Explanation) -> tuple[float, float]:
     """Log odds that one scale of all torques is off, and its probability.
 
-    A nuisance parameter with a stated prior.  Its odds are the ratio of prior and posterior density where it is zero
-    (Savage and Dickey) times the prior odds of any rare effect.
+    A nuisance parameter with a stated prior; the prior odds are those of any rare effect.
     """
-    w, std = ex.torque_scale()
-    odds = stats.norm.logpdf(0.0, 0.0, GAIN_COMMON) - stats.norm.logpdf(0.0, w, std) + np.log(RARE)
+    odds = ex.space.torque_scale_odds(ex.chosen, ex.settings) + np.log(RARE)
     return float(odds), float(special.expit(odds))
 
 

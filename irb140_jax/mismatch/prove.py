@@ -114,11 +114,13 @@ class Refit:
         loose: Its candidates that stand for inertials wrong beyond their stated uncertainty: free here too.
         grams: Gram matrices of their columns and the inertials' alone, by block, under the noise that they leave, shape
             (blocks, K + 1, K + 1).
+        prior: Standard deviations of the columns' prior, in units of those that were stated: of the explanation.
     """
 
     ex: Explanation
     loose: tuple[int, ...]
     grams: np.ndarray
+    prior: np.ndarray
 
     @property
     def columns(self) -> np.ndarray:
@@ -128,7 +130,7 @@ class Refit:
     def posterior(self, without: np.ndarray | None = None) -> Posterior:
         """Inertials of possible bodies from all blocks, or from all but some."""
         blocks = self.grams if without is None else self.grams[~without]
-        post = posterior(blocks.sum(axis=0), np.arange(len(self.columns)))
+        post = posterior(blocks.sum(axis=0), np.arange(len(self.columns)), prior=self.prior)
         mean = self.ex.of_bodies(post.mean, post.cov, self.loose, self.ex.data.nuisances)
         return Posterior(self.columns, mean, post.cov)
 
@@ -138,18 +140,20 @@ def refitted(ex: Explanation) -> Refit:
     loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
     columns = ex.columns(loose)
     stretches = [s.of_rigid_body(columns) for s in ex.data.stretches]
-    scale = ex.data.scale[columns]
-    return Refit(ex, loose, grams(stretches, _noise_left(stretches, scale, ex.noise), scale, BLOCKS))
+    scale, prior = ex.data.scale[columns], np.ones(len(columns))
+    prior[: ex.data.nuisances] = ex.space.width(ex.chosen, ex.settings)
+    noise = _noise_left(stretches, scale, prior, ex.noise)
+    return Refit(ex, loose, grams(stretches, noise, scale, BLOCKS), prior)
 
 
-def _noise_left(stretches: list[Stretch], scale: np.ndarray, noise: Noise) -> Noise:
+def _noise_left(stretches: list[Stretch], scale: np.ndarray, prior: np.ndarray, noise: Noise) -> Noise:
     """Noise that columns leave, fitted under noise that was guessed before, and again under what they leave."""
     every, n = np.arange(len(scale)), stretches[0].y.shape[1]
     for _ in range(SETTLED):
-        post = posterior(grams(stretches, noise, scale, 1).sum(axis=0), every)
+        post = posterior(grams(stretches, noise, scale, 1).sum(axis=0), every, prior=prior)
         residuals = [s.y - s.X @ (post.mean * scale) for s in stretches]
         # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
-        dof = np.full(n, (len(scale) - float(np.trace(post.cov))) / n)
+        dof = np.full(n, (len(scale) - float(np.sum(np.diag(post.cov) / prior**2))) / n)
         noise = noise_from_residuals(residuals, [s.use for s in stretches], dof, [s.unsure for s in stretches])
     return noise
 

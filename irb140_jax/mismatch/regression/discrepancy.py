@@ -1,8 +1,8 @@
 """Model discrepancy: what a joint's torque may differ by from any law of the library, as a function of its own state.
 
-Two zero-mean blocks of features a joint.  The smooth block is a function of position, speed, direction and load.  The
-reversal block holds what a friction law may do differently around a change of direction: bristles, rounding, lateness.
-Neither holds a term that a named effect consists of (a constant, the direction itself, position, speed, acceleration,
+Three zero-mean blocks of features a joint, each with a size of its own.  The first is a function of position alone.
+The smooth block is a function of position, speed, direction and load.  The reversal block holds what a friction law may
+do differently around a change of direction: bristles, rounding, lateness.  None holds a term that a named effect consists of (a constant, the direction itself, position, speed, acceleration,
 load): the discrepancy stands for what no law explains, not for the laws.
 
 Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(3), 2001; the low rank as in Rasmussen
@@ -22,7 +22,7 @@ ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which friction near
 LATE = (-0.01, -0.005, 0.005, 0.01, 0.02)  # s by which friction turns before or after the joint
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
-FEATURES = 78  # of both blocks
+FEATURES = 78  # of all blocks
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Discrepancy:
 
     Attributes:
         scales: Sizes of the recordings that it was found in.
-        coefficients: Of each joint's smooth and reversal features [N m or N], zero where nothing is carried, shape
+        coefficients: Of each joint's features, block by block [N m or N], zero where nothing is carried, shape
             (n, FEATURES).
     """
 
@@ -47,8 +47,7 @@ class Discrepancy:
         """
         out = np.zeros_like(load)
         for j in np.flatnonzero(self.coefficients.any(axis=1)):
-            features = [f(r, load, self.scales, int(j)) for f in (smooth_features, reversal_features)]
-            out[:, j] = np.concatenate(features, axis=1) @ self.coefficients[j]
+            out[:, j] = np.concatenate(features(r, load, self.scales, int(j)), axis=1) @ self.coefficients[j]
         return out
 
     def on(self, joints: np.ndarray) -> "Discrepancy | None":
@@ -69,8 +68,8 @@ class Discrepancy:
         return Discrepancy(Scales(**sizes), np.array(data["coefficients"], dtype=float))
 
 
-def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
-    """Smooth functions of one joint's state, shape (T, 37).
+def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> list[np.ndarray]:
+    """The three blocks of one joint, each (T, features).
 
     Args:
         r: T samples of n joints.
@@ -81,6 +80,11 @@ def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) ->
     middle, half = 0.5 * (scales.high[j] + scales.low[j]), 0.5 * max(scales.high[j] - scales.low[j], 1e-9)
     x = np.clip((r.q[:, j] - middle) / half, -1.0, 1.0)
     position = np.polynomial.chebyshev.chebvander(x, ORDERS)[:, 1:]
+    return [position[:, 1:], _smooth(r, load, scales, j, position), _reversal(r, load, scales, j)]
+
+
+def _smooth(r: Conditioned, load: np.ndarray, scales: Scales, j: int, position: np.ndarray) -> np.ndarray:
+    """Smooth functions of one joint's state, shape (T, 32)."""
     direction, carried = r.direction[:, j], load[:, j] / max(float(scales.torque[j]), 1e-12)
     fast = 1.0 + 2.0 * np.log(np.abs(r.qd[:, j]) / scales.speed[j] + 1e-3) / np.log(1e3)
     speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
@@ -88,16 +92,16 @@ def smooth_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) ->
     # Of friction that grows with load only how it bends: in proportion is a law of its own.
     bend = even**2 - even * np.sum(even**3) / max(float(np.sum(even**2)), 1e-300)
     parts = [
-        position[:, 1:], turned * position, turned * speed, speed,
+        turned * position, turned * speed, speed,
         (turned * speed)[:, :, None] * position[:, None, :2],
         turned * bend, (carried**2)[:, None], carried[:, None] * position[:, :2],
         turned * even * position[:, :2], turned * even * speed,
     ]  # fmt: skip
-    return np.concatenate([p.reshape(len(x), -1) for p in parts], axis=1)
+    return np.concatenate([p.reshape(len(position), -1) for p in parts], axis=1)
 
 
-def reversal_features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
-    """What happens around one joint's reversals and along its slopes, shape (T, 41); arguments as above."""
+def _reversal(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
+    """What happens around one joint's reversals and along its slopes, shape (T, 41)."""
     q, qd, qdd, dt = r.q[:, j], r.qd[:, j], r.qdd[:, j], float(np.mean(np.diff(r.t)))
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]

@@ -18,7 +18,7 @@ from irb140_jax.mismatch.assemble import Data
 from irb140_jax.mismatch.noise import Noise, correlation_time
 from irb140_jax.mismatch.regression.nuisances import SCALED, Nuisances
 
-SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1)  # of a block, as a share of the joint's torque
+SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)  # of a block, as a share of the joint's torque
 USUAL = 0.03  # share of the torque that laws are usually wrong by: scale of the half-Cauchy prior
 ONE = 24  # index of the level at which the noise is as it was estimated
 LEVELS = tuple(1.25 ** (k - ONE) for k in range(2 * ONE))  # noise over what was estimated

@@ -7,7 +7,7 @@ import numpy as np
 
 from irb140_jax.effects import Scales
 from irb140_jax.mismatch.along import Prepared
-from irb140_jax.mismatch.regression.discrepancy import reversal_features, smooth_features
+from irb140_jax.mismatch.regression.discrepancy import features
 from irb140_jax.mismatch.regression.servo import scale_width, servo_columns
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
@@ -19,7 +19,7 @@ ROTOR = 0.10  # of the stated armature
 BIAS = 0.10  # of the joint's torque: what differs by direction may go on through a reversal, or vanish there
 # A joint's own columns with stated widths, in their order; those of a servo come after them.
 FIXED = ("gain", "delay", "rotor", "smoothing", "bias")
-SCALED = ("smooth", "reversal", "slope")  # blocks of a joint whose size is learned from the recordings
+SCALED = ("position", "smooth", "reversal", "slope")  # blocks of a joint whose size is learned from the recordings
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,7 +48,7 @@ def feature_coefficients(extra: Nuisances, own: Sequence[np.ndarray], joints: np
         joints: At which joints, shape (n,).
     """
     return np.stack([
-        np.where(use, v[(g == 0) | (g == 1)] * u[(g == 0) | (g == 1)], 0.0)
+        np.where(use, (v * u)[(g >= 0) & (g < SCALED.index("slope"))], 0.0)
         for use, v, g, u in zip(joints, own, extra.groups, extra.units, strict=True)
     ])  # fmt: skip
 
@@ -88,27 +88,27 @@ def nuisances(
             # Levels of dry friction about their mean, which is a law's; of one recording there is nothing beside it.
             own = (np.arange(count) == r) - 1.0 / count
             slope = motion.direction[:, [j]] * (own if count > 1 else np.zeros(0))
-            features = [f(motion, load, scales, j) for f in (smooth_features, reversal_features)]
-            joints.append([band.apply(b) for b in (fixed, *features, slope)])
+            joints.append([band.apply(b) for b in (fixed, *features(motion, load, scales, j), slope)])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
     units = []
     for j in range(n):
         factors = [np.ones(raw[0][j][0].shape[1])]
-        for block in range(1, 4):
+        for block, name in enumerate(SCALED, 1):
             power = sum(np.sum(raw[r][j][block] ** 2, axis=0) for r in range(count))
             rows = sum(len(raw[r][j][block]) for r in range(count))
             rms = np.sqrt(power / rows)
             gone = rms < 1e-9 * np.max(rms, initial=1e-300)
             width = max(raw[0][j][block].shape[1], 1)
             # Slopes are shares of a friction level; a discrepancy of size one is as large as the torque.
-            size = scales.torque[j] / (1.0 if block == 3 else np.sqrt(width))
-            factor = np.where(gone, 0.0, size / np.where(gone, 1.0, 1.0 if block == 3 else rms))
+            level = name == "slope"
+            size = scales.torque[j] / (1.0 if level else np.sqrt(width))
+            factor = np.where(gone, 0.0, size / np.where(gone, 1.0, 1.0 if level else rms))
             factors.append(factor)
             for r in range(count):
                 raw[r][j][block] = raw[r][j][block] * factor
         units.append(np.concatenate(factors))
-        group = np.repeat([-1, 0, 1, 2], [raw[0][j][b].shape[1] for b in range(4)])
+        group = np.repeat(np.arange(-1, len(SCALED)), [b.shape[1] for b in raw[0][j]])
         for r in range(count):
             out[r][0].append(np.concatenate(raw[r][j], axis=1))
             out[r][1].append(group)

@@ -14,6 +14,10 @@ from irb140_jax.mismatch.regression.gram import LEVELS, SIZES, JointGram, Settin
 
 Settings = tuple[Setting, ...]  # one a joint
 DRY = "coulomb_friction"
+# True over stated error of the inertials, in octaves: half of all statements are right within a factor of two.
+OCTAVES = np.arange(-1.0, 6.0)
+WIDTHS = 2.0**OCTAVES
+LOG_PRIOR = -np.log1p(OCTAVES**2) - special.logsumexp(-np.log1p(OCTAVES**2))  # a Cauchy distribution over octaves
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,11 +143,42 @@ class Space:
 
     def log_evidence(self, chosen: Sequence[int], settings: Settings) -> float:
         """Log evidence and prior of a set; -inf where its amplitudes are inadmissible."""
+        H, by_width = self._by_width(chosen, settings)
+        if self._impossible(chosen, H, self.prior(chosen, settings)):
+            return -np.inf
+        return self.constant(settings) + self._prior(chosen) + float(special.logsumexp(by_width))
+
+    def _by_width(self, chosen: Sequence[int], settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+        """Gram matrix of a set's columns and y, and log evidence and prior at each width of the inertials' prior."""
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(settings, every, every)
-        if self._impossible(chosen, H):
-            return -np.inf
-        return self.constant(settings) + self._prior(chosen) + float(_log_evidences(H[None])[0])
+        by_width = _by_width(H, self.inertials)
+        self._widths[tuple(sorted(chosen)), settings] = float(WIDTHS[np.argmax(by_width)])
+        return H, by_width
+
+    def width(self, chosen: Sequence[int], settings: Settings) -> float:
+        """True over stated error of the inertials that is most probable beside a set."""
+        key = tuple(sorted(chosen)), settings
+        if key not in self._widths:
+            self._by_width(chosen, settings)
+        return self._widths[key]
+
+    @cached_property
+    def _widths(self) -> dict[tuple, float]:
+        return {}
+
+    def prior(self, chosen: Sequence[int], settings: Settings) -> np.ndarray:
+        """Prior standard deviations of a set's columns, in units of those that were stated."""
+        out = np.ones(self.offset + sum(len(self.columns[c]) for c in chosen))
+        out[: self.inertials] = self.width(chosen, settings)
+        return out
+
+    def torque_scale_odds(self, chosen: Sequence[int], settings: Settings) -> float:
+        """Log evidence for one scale of all torques, the first of the common nuisances, over that of none."""
+        every = self.with_y(self.set_columns(chosen))
+        H = self.gram(settings, every, every)
+        without = np.delete(np.delete(H, self.inertials, axis=0), self.inertials, axis=1)
+        return float(np.subtract(*(special.logsumexp(_by_width(x, self.inertials)) for x in (H, without))))
 
     def _prior(self, chosen: Sequence[int]) -> float:
         return float(sum(self.log_prior[c] for c in chosen))
@@ -172,7 +207,7 @@ class Space:
         named = [slice(int(e) - len(self.columns[c]), int(e)) for c, e in zip(chosen, ends, strict=True)
                  if self.candidates[c].slug != "inertials"]  # fmt: skip
         found = posterior(np.pad(H[np.ix_(at, at)], (0, 1)) + np.pad(H[at, -1:], ((0, 1), (len(at), 0))),
-                          np.arange(len(at)), named)  # fmt: skip
+                          np.arange(len(at)), named, self.prior(chosen, settings)[at])  # fmt: skip
         mean[at], cov[np.ix_(at, at)] = found.mean, found.cov
         return mean, cov
 
@@ -204,8 +239,9 @@ class Space:
         moved = True
         while moved:
             moved = False
+            prior = self.prior(chosen, settings)
             for j in joints:
-                better = self._climbed(index, settings, j)
+                better = self._climbed(index, settings, j, prior)
                 moved |= better != settings and len(joints) > 1
                 settings = better
         return self.log_evidence(chosen, settings) + self.over_shapes(chosen, settings), settings
@@ -241,8 +277,8 @@ class Space:
             groups.setdefault(key, []).append(i)
         return [groups[key] for key in keys]
 
-    def _climbed(self, index: np.ndarray, settings: Settings, j: int) -> Settings:
-        """The settings with those of one joint at their best beside a set."""
+    def _climbed(self, index: np.ndarray, settings: Settings, j: int, prior: np.ndarray) -> Settings:
+        """The settings with those of one joint at their best beside a set whose columns have these prior widths."""
         gram = self.joints[j]
         rest = self.gram(settings, index, index, [i for i in range(len(self.joints)) if i != j])
         at = self.places[j][index]
@@ -255,7 +291,7 @@ class Space:
             H = np.repeat(rest[None], len(new), axis=0)
             for k, s in enumerate(new):
                 H[k][into] += gram.at(s).left(take, take)
-            for s, value in zip(new, _log_evidences(H) if new else (), strict=True):
+            for s, value in zip(new, _log_evidences(H, prior) if new else (), strict=True):
                 known[s] = gram.at(s).constant + float(value)
 
         now = settings[j]
@@ -270,7 +306,7 @@ class Space:
     def inadmissible(self, chosen: Sequence[int], settings: Settings) -> list[int]:
         """Members of a set whose amplitudes are not such as can be."""
         every = self.with_y(self.set_columns(chosen))
-        return self._impossible(chosen, self.gram(settings, every, every))
+        return self._impossible(chosen, self.gram(settings, every, every), self.prior(chosen, settings))
 
     def reshaped(self, chosen: Sequence[int], settings: Settings) -> tuple[int, ...]:
         """The set with the best other shape for each member whose amplitudes can't be at its own, if there is one."""
@@ -282,11 +318,12 @@ class Space:
                 now = [*rest, self._alike[c][int(np.argmax(gains))]]
         return tuple(sorted(now))
 
-    def _impossible(self, chosen: Sequence[int], H: np.ndarray) -> list[int]:
-        """The same, from the Gram matrix of a set's columns and y."""
+    def _impossible(self, chosen: Sequence[int], H: np.ndarray, prior: np.ndarray) -> list[int]:
+        """The same, from the Gram matrix of a set's columns and y, and the columns' prior widths."""
         if not len(chosen):
             return []
-        mean = linalg.cho_solve((root(with_prior(H[:-1, :-1])), True), H[:-1, -1])[self.offset :]
+        G = with_prior(H[:-1, :-1] * np.outer(prior, prior))
+        mean = linalg.cho_solve((root(G), True), prior * H[:-1, -1])[self.offset :]
         ends = np.cumsum([len(self.columns[c]) for c in chosen])
         parts = [mean[e - len(self.columns[c]) : e] for c, e in zip(chosen, ends, strict=True)]
         return [c for c, part in zip(chosen, parts, strict=True) if self._outside(np.array([c]), part[None])[0]]
@@ -299,9 +336,10 @@ class Space:
 
     def near(self, chosen: Sequence[int], settings: Settings, columns: np.ndarray) -> np.ndarray:
         """Gram matrix of some shared columns and y, inertials, nuisances and a set integrated out."""
-        base, extra = self.set_columns(chosen), self.with_y(columns)
-        chol = root(with_prior(self.gram(settings, base, base)))
-        half = linalg.solve_triangular(chol, self.gram(settings, base, extra), lower=True, check_finite=False)
+        base, extra, prior = self.set_columns(chosen), self.with_y(columns), self.prior(chosen, settings)
+        chol = root(with_prior(self.gram(settings, base, base) * np.outer(prior, prior)))
+        across = prior[:, None] * self.gram(settings, base, extra)
+        half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
         return self.gram(settings, extra, extra) - half.T @ half
 
     def gains(self, chosen: Sequence[int], settings: Settings, which: np.ndarray) -> np.ndarray:
@@ -312,11 +350,10 @@ class Space:
         extra = np.unique(np.concatenate([self.columns[i] for i in which]))
         number = np.full(self.size, -1)
         number[extra] = np.arange(len(extra))
-        base = self.set_columns(chosen)
-        chol = root(with_prior(self.gram(settings, base, base)))
-        half = linalg.solve_triangular(
-            chol, self.gram(settings, base, self.with_y(extra)), lower=True, check_finite=False
-        )
+        base, prior = self.set_columns(chosen), self.prior(chosen, settings)
+        chol = root(with_prior(self.gram(settings, base, base) * np.outer(prior, prior)))
+        across = prior[:, None] * self.gram(settings, base, self.with_y(extra))
+        half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
         with_y = self.gram(settings, extra, np.array([self.size]))[:, 0] - half[:, :-1].T @ half[:, -1]
         by_size: dict[int, list[int]] = {}
         for m, i in enumerate(which):
@@ -354,12 +391,24 @@ def _near(setting: Setting, lowest: int) -> list[Setting]:
     return out
 
 
-def _log_evidences(H: np.ndarray) -> np.ndarray:
-    """Log evidence of amplitudes with unit priors from Gram matrices (b, k + 1, k + 1) whose last column is y, (b,).
+def _by_width(H: np.ndarray, inertials: int) -> np.ndarray:
+    """Log evidence and prior of each width of the inertials' prior, which come first in a Gram matrix, (WIDTHS,)."""
+    prior = np.ones((len(WIDTHS), len(H) - 1))
+    prior[:, :inertials] = WIDTHS[:, None]
+    return _log_evidences(np.repeat(H[None], len(WIDTHS), axis=0), prior) + LOG_PRIOR
+
+
+def _log_evidences(H: np.ndarray, prior: np.ndarray) -> np.ndarray:
+    """Log evidence of amplitudes from Gram matrices (b, k + 1, k + 1) whose last column is y, (b,).
 
     The last pivot of a Cholesky factor that has y in it is what is left of y.
+
+    Args:
+        H: The matrices.
+        prior: Standard deviations of the amplitudes, shape (k,) or (b, k).
     """
-    M = with_prior(H)
+    scale = np.pad(prior, [(0, 0)] * (prior.ndim - 1) + [(0, 1)], constant_values=1.0)
+    M = with_prior(H * (scale[..., :, None] * scale[..., None, :]))
     try:
         diagonal = np.diagonal(np.linalg.cholesky(M), axis1=1, axis2=2)
     except np.linalg.LinAlgError:

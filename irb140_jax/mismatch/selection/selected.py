@@ -110,6 +110,7 @@ def noise_left(
     for s, e in zip(data.stretches, extra, strict=True):
         r = s.y - s.X[..., at] @ w - e.common @ common
         residuals.append(r - np.stack([x @ v for x, v in zip(e.own, own, strict=True)], axis=1))
-    shared = (len(mean) - float(np.trace(cov))) / n  # shrunk ones count for less; they are split over the joints
+    known = np.diag(cov) / space.prior(chosen, settings) ** 2
+    shared = (len(mean) - float(known.sum())) / n  # shrunk ones count for less; they are split over the joints
     dof = np.array([g.at(s).dof() for g, s in zip(space.joints, settings, strict=True)]) + shared
     return noise_from_residuals(residuals, [s.use for s in data.stretches], dof, [s.unsure for s in data.stretches])
