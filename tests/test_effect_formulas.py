@@ -107,7 +107,7 @@ def shifted(p, m):
     """What a delay of all torques adds, by Gauss and Legendre's rule."""
     at = [m.t + 0.5 * (1.0 + u) * p["delay"] for u, _ in FOUR]
     slopes = [sum(0.5 * w * np.interp(x, m.t, rate) for x, (_, w) in zip(at, FOUR, strict=True))
-              for rate in np.asarray(m.asked_rate).T]  # fmt: skip
+              for rate in np.asarray(m.scaled_rate).T]  # fmt: skip
     return p["delay"] * np.stack(slopes, axis=1)
 
 
@@ -167,7 +167,7 @@ def test_a_delays_finer_grid_lies_about_the_delay_that_was_found(slug):
 def test_a_delay_that_is_on_the_grid_is_right_up_to_the_highest_frequency(delay):
     t, omega = np.arange(0.0, 2.0, 0.005), 2.0 * np.pi * 20.0
     rate = jnp.asarray(omega * np.cos(omega * t))[:, None]
-    m = dataclasses.replace(motion(0), t=jnp.asarray(t), asked_rate=rate)
+    m = dataclasses.replace(motion(0), t=jnp.asarray(t), scaled_rate=rate)
     law = CATALOGUE["time_delay"]
     w, shape = law.amplitudes({"delay": delay})
     made = np.asarray(law.columns(m, jnp.arange(1), jnp.asarray(shape)))[:, 0, 0] * w[0]

@@ -53,13 +53,14 @@ class AbstractEffect(abc.ABC):
         not_in_mjcf: What of it MJCF can't express and why, one sentence without its full stop; "" where nothing is.
         leans_on_inertials: Its torque is made of the rigid body's own, so it is known no better than the inertials.
         transmission: It acts before or inside the transmission, no part of what the links need on the motors' path.
-        logged: 0, or its place in how a log comes about from what motors feel: 1 scales it, 2 lags, 3 is in the clocks.
-            Each works on what those before it have made of the torque.
+        logged: 0, or its place in how a log comes about from what motors feel: 1 scales it, 2 shifts in time what it is
+            when scaled, of which there is one at a joint.
         once: It happens once, in one recording; nothing of it can be predicted from the others.
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
         scouts: Its grid of shapes is looked for in the residual (see `scout`).
         beside: Effects that are left free in a scan: without them it would find the shape that stands in for them.
         scanned: From how many shapes a scout picks the best: what chance has as many tries at.
+        shape_follows: Its shape is none of its own but what its amplitude says (see `at_shape`).
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
         tied: Its amplitudes are of one order of size: what the data can't see of one, the others bound.
         vector: Its amplitudes are components of one vector: what the data can't see of it may be larger than the rest.
@@ -94,6 +95,7 @@ class AbstractEffect(abc.ABC):
     scouts: ClassVar[bool] = False
     beside: ClassVar[tuple[str, ...]] = ()
     scanned: ClassVar[int] = 1
+    shape_follows: ClassVar[bool] = False
     adds_up: ClassVar[bool] = False
     tied: ClassVar[bool] = False
     vector: ClassVar[bool] = False

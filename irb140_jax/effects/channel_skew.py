@@ -24,7 +24,7 @@ class ChannelSkew(AbstractDelay):
         return np.arange(robot.n if robot.n > 1 else 0)[:, None]
 
     def columns(self, motion, joints, shape):
-        return mean_slopes(motion.t, of_site(motion.asked_rate, joints), shape[0])[:, :, None]
+        return mean_slopes(motion.t, of_site(motion.scaled_rate, joints), shape[0])[:, :, None]
 
     def where(self, names, values, units):
         early = "early" if values["delay"] > 0.0 else "late"

@@ -20,7 +20,8 @@ class AbstractDelay(AbstractEffect):
     source = "Ljung, System Identification, 1999, ch. 4"
     parameters = (Parameter("delay", "s"),)
     variants = ((0,),)
-    logged = 3
+    logged = 2
+    shape_follows = True
     history = "is a shift between the clocks of the log, which pairs each torque with an earlier position"
     not_in_mjcf = "it belongs to the clocks of the log, not to the arm"
 

@@ -44,7 +44,6 @@ class Motion(eqx.Module):
         total: Torque the motors give: load and friction [N m or N], shape (T, n).
         carried: What the links alone would need on the motors' path: no rotors, stiff gears [N m or N], shape (T, n).
         scaled_rate: Time derivative of the total torque by the log's torque constants, shape (T, n).
-        asked_rate: Time derivative of what the log would show if its clocks were right: lags too, shape (T, n).
         rigid: What the rigid body does along the motion.
         rest_speed: Speed below which the sign of qd can't be told from the encoder's noise [rad/s or m/s], shape (n,).
         direction: sign(qd), and between two signs what friction does while a joint sticks, shape (T, n).
@@ -60,7 +59,6 @@ class Motion(eqx.Module):
     total: JointSamples
     carried: JointSamples
     scaled_rate: JointSamples
-    asked_rate: JointSamples
     rigid: RigidBody
     rest_speed: Joints
     direction: JointSamples

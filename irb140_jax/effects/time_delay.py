@@ -22,7 +22,7 @@ class TimeDelay(AbstractDelay):
         return np.arange(robot.n)[None, :]
 
     def columns(self, motion, joints, shape):
-        return mean_slopes(motion.t, motion.asked_rate, shape[0])[:, :, None]
+        return mean_slopes(motion.t, motion.scaled_rate, shape[0])[:, :, None]
 
     def where(self, names, values, units):
         return f"{names}: positions are logged {1e3 * values['delay']:.3g} ms after the torque they belong to"

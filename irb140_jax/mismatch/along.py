@@ -50,14 +50,13 @@ class Loads(NamedTuple):
 
     Attributes:
         load, total, carried: See `Motion`.
-        scaled, asked: Those whose rates are in `Motion`.
+        scaled: That whose rate is in `Motion`.
     """
 
     load: np.ndarray
     total: np.ndarray
     carried: np.ndarray
     scaled: np.ndarray
-    asked: np.ndarray
 
 
 LARGEST = 1e12  # [N m or N] per unit of an amplitude: growth without bound, whose squares would overflow
@@ -166,11 +165,11 @@ def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, rec
     """
     r = along.recording
     nominal = along.nominal
-    load, total, carried, scaled, asked = loads or (nominal, nominal, nominal - along.motor_side, nominal, nominal)
+    load, total, carried, scaled = loads or (nominal, nominal, nominal - along.motor_side, nominal)
     dt = float(np.mean(np.diff(r.t)))
-    rates = np.gradient(scaled, dt, axis=0), np.gradient(asked, dt, axis=0)
     near_rest = (r.rest_speed, r.direction)
-    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, *rates, along.rigid, *near_rest)
+    rate = np.gradient(scaled, dt, axis=0)
+    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, rate, along.rigid, *near_rest)
     which = np.array(float(recording))
     whole = Motion(*moving, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
     per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)

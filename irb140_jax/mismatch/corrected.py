@@ -168,8 +168,8 @@ class CorrectedRobot(AbstractPlant):
         return jax.lax.fori_loop(0, NEWTON_STEPS, step, jnp.zeros_like(q))
 
     def summed(self, motion: Motion, base: JointSamples, stepped) -> tuple[JointSamples, ...]:
-        """Load, total, carried, scaled and asked torque (see `Loads`), and what is logged."""
-        friction, logged, load = jnp.zeros_like(base), [jnp.zeros_like(base)] * 3, base
+        """Load, total, carried and scaled torque (see `Loads`), and what is logged."""
+        friction, logged, load = jnp.zeros_like(base), [jnp.zeros_like(base)] * 2, base
         inside = self.motor_side(motion.qd, motion.qdd)
         for k, a in enumerate(self.effects):
             rows = jnp.arange(self.n) if a.effect.everywhere else jnp.array(a.joints)
@@ -183,9 +183,9 @@ class CorrectedRobot(AbstractPlant):
             else:
                 load += part
                 inside += part if a.effect.transmission else 0.0
-        scales, lags, clocks = logged
+        scales, shifts = logged
         total = load + friction
-        return load, total, load - inside, total + scales, total + scales + lags, total + scales + lags + clocks
+        return load, total, load - inside, total + scales, total + scales + shifts
 
     def own_torque(self, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> JointSamples:
         """Rotors, friction and springs of the model as given."""
@@ -219,16 +219,16 @@ def _torque(
     sensed = Sensitivities(robot.robot, robot.ahead, q, qd, qdd)
 
     def summed(_, torques):
-        load, total, carried, scaled, asked, _ = torques
+        load, total, carried, scaled, _ = torques
         rigid = cast(RigidBody, sensed)  # it has the same names, and derives what is asked for
         new = jnp.array(-1.0)  # no recording of the diagnosis
-        moving = (since, q, qd, qdd, load, total, carried, rate(scaled), rate(asked), rigid)
+        moving = (since, q, qd, qdd, load, total, carried, rate(scaled), rigid)
         motion = Motion(*moving, robot.rest_speed, direction, new)
         return robot.summed(motion, base, stepped)
 
     # Twice, as in the fit: columns that depend on the load see the corrected one the second time.
     carried = load - robot.motor_side(qd, qdd)
-    return jax.lax.fori_loop(0, 2, summed, (load, load, carried, load, load, load))[-1]
+    return jax.lax.fori_loop(0, 2, summed, (load, load, carried, load, load))[-1]
 
 
 def corrected_robot(model: CorrectedModel) -> CorrectedRobot:

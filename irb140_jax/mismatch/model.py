@@ -162,7 +162,7 @@ def composed(
     """
     Y, nominal, inside, columns = along
     load = nominal + Y @ dphi_corrected
-    friction, logged = np.zeros_like(load), np.zeros((3, *load.shape))
+    friction, logged = np.zeros_like(load), np.zeros((2, *load.shape))
     for c, w in zip(candidates, amplitudes, strict=True):
         part = lib.torque(columns, c.columns, w)
         if c.effect.logged:
@@ -173,8 +173,8 @@ def composed(
             load = load + part
             inside = inside + part if c.effect.transmission else inside
     total = load + friction
-    scaled, asked, corrected = total + np.cumsum(logged, axis=0)
-    return Torques(nominal, nominal + Y @ dphi_refit, Loads(load, total, load - inside, scaled, asked), corrected)
+    scaled, corrected = total + np.cumsum(logged, axis=0)
+    return Torques(nominal, nominal + Y @ dphi_refit, Loads(load, total, load - inside, scaled), corrected)
 
 
 def library_of(robot: Robot, effects: Sequence[Named]) -> Library:

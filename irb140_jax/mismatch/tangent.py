@@ -88,15 +88,12 @@ def logged(at: Point, x: np.ndarray, joints: np.ndarray, dt: float) -> np.ndarra
 def counted_twice(at: Point, loads: Loads, dt: float) -> np.ndarray:
     """What laws of the log make of the explanation's torques: it is in their own columns and in all others', (T, n).
 
-    Their own columns are as without each other: were a lag's those of a lag beside the delay found, then without that
-    delay it would be no lag, and could win for what it is not.
-
     Args:
         at: The point.
         loads: Of the explanation.
         dt: Between samples [s].
     """
-    sources = loads.total, loads.scaled, loads.asked
+    sources = loads.total, loads.scaled
     out, every = np.zeros_like(loads.total), np.arange(loads.total.shape[1])
     for law in at.log:
         on = every if law.effect.everywhere else np.array(law.joints)

@@ -61,10 +61,10 @@ def space_of(
 def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
     """Log prior odds of every candidate, shape (candidates,): of its effect, its site and its shape."""
     sites: dict[str, set[tuple[int, ...]]] = {}
-    kinds: dict[tuple[str, tuple[int, ...]], int] = {}
+    kinds: dict[tuple[str, tuple[int, ...]], list[Candidate]] = {}
     for c in data.candidates:
         sites.setdefault(c.slug, set()).add(c.joints)
-        kinds[c.slug, c.joints] = kinds.get((c.slug, c.joints), 0) + 1
+        kinds.setdefault((c.slug, c.joints), []).append(c)
     narrowed = {
         (new[0].slug, tuple(map(int, joints))): _narrowed(new[2][s], old[2][s])
         for new, old in zip(lib.blocks, first.blocks, strict=True)
@@ -72,8 +72,13 @@ def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
     }
 
     def rare(c: Candidate) -> float:
-        shape = kinds[c.slug, c.joints] * c.effect.scanned
-        return float(np.log(RARE / len(sites[c.slug]) / shape)) + narrowed.get((c.slug, c.joints), 0.0)
+        alike, prior = kinds[c.slug, c.joints], np.log(RARE / len(sites[c.slug]) / c.effect.scanned)
+        if c.effect.shape_follows:
+            # No parameter of its own: those that some amplitude may have share its prior.
+            least, most = np.array([o.effect.at_shape(o.shape) for o in alike])[:, :, 0].T
+            middle = np.mean(c.effect.at_shape(c.shape))
+            return float(prior - np.log(np.sum((least <= middle) & (middle < most))))
+        return float(prior - np.log(len(alike))) + narrowed.get((c.slug, c.joints), 0.0)
 
     usual = np.log(COMMON / (1.0 - COMMON))
     return np.array([usual if c.effect.ordinary else rare(c) for c in data.candidates])
