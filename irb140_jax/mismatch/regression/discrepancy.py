@@ -1,8 +1,8 @@
 """Model discrepancy: what a joint's torque may differ by from any law of the library, as a function of its own state.
 
-Three zero-mean blocks of features a joint, each with a size of its own.  The first is a function of position alone.
-The smooth block is a function of position, speed, direction and load.  The reversal block holds what a friction law may
-do differently around a change of direction: bristles, rounding, lateness.  None holds a term that a named effect consists of (a constant, the direction itself, position, speed, acceleration,
+Four zero-mean blocks of features a joint, each with a size of its own: what depends on position alone, friction that
+depends on speed alone, what depends on several of position, speed, direction and load, and what friction may do
+differently around a change of direction, by bristles or lateness.  None holds a term that a named effect consists of (a constant, the direction itself, position, speed, acceleration,
 load): the discrepancy stands for what no law explains, not for the laws.
 
 Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(3), 2001; the low rank as in Rasmussen
@@ -69,7 +69,7 @@ class Discrepancy:
 
 
 def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> list[np.ndarray]:
-    """The three blocks of one joint, each (T, features).
+    """The four blocks of one joint, each (T, features).
 
     Args:
         r: T samples of n joints.
@@ -80,15 +80,18 @@ def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> list[n
     middle, half = 0.5 * (scales.high[j] + scales.low[j]), 0.5 * max(scales.high[j] - scales.low[j], 1e-9)
     x = np.clip((r.q[:, j] - middle) / half, -1.0, 1.0)
     position = np.polynomial.chebyshev.chebvander(x, ORDERS)[:, 1:]
-    return [position[:, 1:], _smooth(r, load, scales, j, position), _reversal(r, load, scales, j)]
-
-
-def _smooth(r: Conditioned, load: np.ndarray, scales: Scales, j: int, position: np.ndarray) -> np.ndarray:
-    """Smooth functions of one joint's state, shape (T, 32)."""
-    direction, carried = r.direction[:, j], load[:, j] / max(float(scales.torque[j]), 1e-12)
     fast = 1.0 + 2.0 * np.log(np.abs(r.qd[:, j]) / scales.speed[j] + 1e-3) / np.log(1e3)
     speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
-    turned, even = direction[:, None], np.abs(carried)[:, None]
+    qd, direction = r.qd[:, [j]], r.direction[:, [j]]
+    rounded = direction - qd / (np.abs(qd) + np.array(ROUNDED) * scales.speed[j])
+    carried = load[:, j] / max(float(scales.torque[j]), 1e-12)
+    smooth, reversal = _smooth(r, carried, j, position, speed), _reversal(r, load, carried, scales, j, rounded)
+    return [position[:, 1:], rounded, smooth, reversal]
+
+
+def _smooth(r: Conditioned, carried: np.ndarray, j: int, position: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Smooth functions of several of one joint's position, speed, direction and load, shape (T, 28)."""
+    turned, even = r.direction[:, [j]], np.abs(carried)[:, None]
     # Of friction that grows with load only how it bends: in proportion is a law of its own.
     bend = even**2 - even * np.sum(even**3) / max(float(np.sum(even**2)), 1e-300)
     parts = [
@@ -100,20 +103,21 @@ def _smooth(r: Conditioned, load: np.ndarray, scales: Scales, j: int, position: 
     return np.concatenate([p.reshape(len(position), -1) for p in parts], axis=1)
 
 
-def _reversal(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> np.ndarray:
-    """What happens around one joint's reversals and along its slopes, shape (T, 41)."""
+def _reversal(
+    r: Conditioned, load: np.ndarray, carried: np.ndarray, scales: Scales, j: int, rounded: np.ndarray
+) -> np.ndarray:
+    """What happens around one joint's reversals and along its slopes, shape (T, 37)."""
     q, qd, qdd, dt = r.q[:, j], r.qd[:, j], r.qdd[:, j], float(np.mean(np.diff(r.t)))
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
     base = [_relaxed(q, share * travel) - direction for share in TRAVEL]
-    base += [direction - qd / np.hypot(qd, share * scales.speed[j]) for share in ROUNDED]
     rest = float(scales.rest_speed[j])
     base += [np.tanh((qd + late * qdd) / rest) - direction for late in LATE]
-    X = np.stack(base, axis=1)
-    carried = np.abs(load[:, j]) / max(float(scales.torque[j]), 1e-12)
-    pushed = np.abs(qdd) / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
+    alone = np.stack(base, axis=1)
+    X, even = np.concatenate([alone, rounded], axis=1), np.abs(carried)[:, None]
+    pushed = np.abs(qdd)[:, None] / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
     slopes = np.stack([np.gradient(load[:, j], dt), np.gradient(qdd, dt)], axis=1)
-    return np.concatenate([X, X * carried[:, None], X * pushed[:, None], slopes], axis=1)
+    return np.concatenate([alone, X * even, X * pushed, slopes], axis=1)
 
 
 def _relaxed(q: np.ndarray, travel: float) -> np.ndarray:
