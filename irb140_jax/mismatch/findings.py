@@ -125,7 +125,7 @@ def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any
     rows = []
     chosen = {(ex.data.candidates[c].slug, ex.data.candidates[c].joints) for c in ex.chosen}
     # Alone: over nothing but the inertials, with noise and discrepancy of the final model.
-    chi = ex.gains((), range(len(ex.data.candidates))) - ex.space.log_prior
+    chi = ex.gains((), range(len(ex.data.candidates))) - ex.space.log_prior - ex.space.kinds.one_more(())
     best: dict[tuple[str, tuple[int, ...]], float] = {}
     for c, gain in zip(ex.data.candidates, chi, strict=True):
         best[c.slug, c.joints] = max(best.get((c.slug, c.joints), -np.inf), float(gain))

@@ -21,6 +21,42 @@ LOG_PRIOR = -np.log1p(OCTAVES**2) - special.logsumexp(-np.log1p(OCTAVES**2))  # 
 
 
 @dataclasses.dataclass(frozen=True)
+class Kinds:
+    """How probable it is that effects of one kind are at some of a robot's sites.
+
+    What a model leaves out at one joint it often leaves out at others: the share of sites is a robot's own, with a
+    Beta(sites, N) distribution over robots, so that `sites` of N sites have it on average (Beta and Bernoulli).
+
+    Attributes:
+        of: Kind of each candidate, below 0 where sites are independent, shape (candidates,).
+        number: Sites N of each kind, shape (kinds,).
+        sites: Expected number of sites that have it.
+    """
+
+    of: np.ndarray
+    number: np.ndarray
+    sites: float
+
+    def log_prior(self, chosen: Sequence[int]) -> float:
+        """Log odds of a set's sites against none."""
+        there = self._there(chosen)
+        return float(np.sum(self._log(there) - self._log(np.zeros_like(there))))
+
+    def one_more(self, chosen: Sequence[int]) -> np.ndarray:
+        """Log odds of each candidate's site beside a set, zero where sites are independent, shape (candidates,)."""
+        there = self._there(chosen)
+        odds = self._log(np.minimum(there + 1, self.number)) - self._log(there)
+        return np.where(self.of >= 0, np.append(odds, 0.0)[self.of], 0.0)
+
+    def _there(self, chosen: Sequence[int]) -> np.ndarray:
+        of = self.of[list(chosen)]
+        return np.bincount(of[of >= 0], minlength=len(self.number))
+
+    def _log(self, there: np.ndarray) -> np.ndarray:
+        return special.betaln(self.sites + there, 2.0 * self.number - there)
+
+
+@dataclasses.dataclass(frozen=True)
 class Space:
     """All sets of candidates that a search may visit, and what their evidence is made of.
 
@@ -30,7 +66,8 @@ class Space:
         inertials: Shared columns of the inertial parameters, which come first.
         offset: Shared columns before the amplitudes: inertials and common nuisances, always in.
         size: Shared columns, without y.
-        log_prior: Log prior odds of each candidate, shape (candidates,).
+        log_prior: Log prior odds of each candidate, but for those of its kind at all, shape (candidates,).
+        kinds: What the prior says of kinds of effects.
         lowest, highest: Admissible amplitudes in prior units, padded with -inf and inf, shape (candidates, width).
         weights, least: Weights of the amplitudes in a sum that is bounded from below, and its bound, per candidate.
     """
@@ -41,6 +78,7 @@ class Space:
     offset: int
     size: int
     log_prior: np.ndarray
+    kinds: "Kinds"
     lowest: np.ndarray
     highest: np.ndarray
     weights: np.ndarray
@@ -181,7 +219,7 @@ class Space:
         return float(np.subtract(*(special.logsumexp(_by_width(x, self.inertials)) for x in (H, without))))
 
     def _prior(self, chosen: Sequence[int]) -> float:
-        return float(sum(self.log_prior[c] for c in chosen))
+        return float(sum(self.log_prior[c] for c in chosen)) + self.kinds.log_prior(chosen)
 
     def posterior(
         self, chosen: Sequence[int], settings: Settings, *, instrument: bool = True, scaled: bool = False
@@ -351,6 +389,7 @@ class Space:
         number = np.full(self.size, -1)
         number[extra] = np.arange(len(extra))
         base, prior = self.set_columns(chosen), self.prior(chosen, settings)
+        more = self.kinds.one_more(chosen)
         chol = root(with_prior(self.gram(settings, base, base) * np.outer(prior, prior)))
         across = prior[:, None] * self.gram(settings, base, self.with_y(extra))
         half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
@@ -373,7 +412,7 @@ class Space:
             mean = np.linalg.solve(M, rhs[..., None])[..., 0]
             gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
             ids = which[members]
-            out[members] = np.where(self._outside(ids, mean), -np.inf, gain + self.log_prior[ids])
+            out[members] = np.where(self._outside(ids, mean), -np.inf, gain + self.log_prior[ids] + more[ids])
         return out
 
 

@@ -9,7 +9,7 @@ from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.regression.gram import joint_grams
 from irb140_jax.mismatch.regression.nuisances import Nuisances
-from irb140_jax.mismatch.selection.evidence import Space
+from irb140_jax.mismatch.selection.evidence import Kinds, Space
 
 RARE = 0.05  # expected number of sites of a robot at which an effect that few machines have is left out
 COMMON = 0.5  # probability of ordinary friction at a joint
@@ -54,16 +54,27 @@ def space_of(
             weights[i, :k], least[i] = s, c.lowest[0]
     return Space(
         joint_grams(data, extra, noise, blocks, sensors), candidates, data.nuisances, data.nuisances + common,
-        len(data.scale) + common, log_prior(data, lib, first), lowest, highest, weights, least,
+        len(data.scale) + common, log_prior(data, lib, first), kinds_of(candidates), lowest, highest, weights,
+        least,
     )  # fmt: skip
 
 
-def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
-    """Log prior odds of every candidate, shape (candidates,): of its effect, its site and its shape."""
+def kinds_of(candidates: Sequence[Candidate]) -> Kinds:
+    """Kinds of effects and their sites; ordinary friction is anywhere by itself."""
     sites: dict[str, set[tuple[int, ...]]] = {}
+    for c in candidates:
+        if not c.effect.ordinary:
+            sites.setdefault(c.slug, set()).add(c.joints)
+    number = {slug: k for k, slug in enumerate(sites)}
+    return Kinds(
+        np.array([number.get(c.slug, -1) for c in candidates]), np.array([len(s) for s in sites.values()]), RARE
+    )
+
+
+def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
+    """Log prior odds of every candidate, shape (candidates,): of its shape, and of ordinary friction at a joint."""
     kinds: dict[tuple[str, tuple[int, ...]], list[Candidate]] = {}
     for c in data.candidates:
-        sites.setdefault(c.slug, set()).add(c.joints)
         kinds.setdefault((c.slug, c.joints), []).append(c)
     narrowed = {
         (new[0].slug, tuple(map(int, joints))): _narrowed(new[2][s], old[2][s])
@@ -72,7 +83,7 @@ def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
     }
 
     def rare(c: Candidate) -> float:
-        alike, prior = kinds[c.slug, c.joints], np.log(RARE / len(sites[c.slug]) / c.effect.scanned)
+        alike, prior = kinds[c.slug, c.joints], -np.log(c.effect.scanned)
         if c.effect.shape_follows:
             # No parameter of its own: those that some amplitude may have share its prior.
             least, most = np.array([o.effect.at_shape(o.shape) for o in alike])[:, :, 0].T
