@@ -4,16 +4,15 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scipy import signal, stats
+from scipy import integrate, signal, special, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.noise import correlation_time
 from irb140_jax.mismatch.regression.gram import LEVELS, ONE, SIZES, JointGram, log_prior, own_scale
 from irb140_jax.mismatch.selection.averages import probabilities
-from irb140_jax.mismatch.selection.evidence import Space
+from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Kinds, Space
 from irb140_jax.mismatch.selection.search import Search
-from irb140_jax.mismatch.silent import SILENT
 
 ROWS, INERTIALS, COMMON, OWN = 60, 3, 1, 5
 SLUGS = ("coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia")
@@ -47,17 +46,26 @@ def planted(seed: int, amplitudes: dict[int, float]) -> tuple[Space, list[dict[s
     prior = np.full(len(candidates), np.log(0.05))
     free = np.full((len(candidates), 1), np.inf)
     nothing = np.zeros((len(candidates), 1)), -free[:, 0]
-    space = Space(tuple(joints), tuple(candidates), INERTIALS, INERTIALS + COMMON, size, prior, -free, free, *nothing)
+    kinds = Kinds(np.full(len(candidates), -1), np.zeros(0), 0.05)
+    space = Space(
+        tuple(joints), tuple(candidates), INERTIALS, INERTIALS + COMMON, size, prior, kinds, -free, free, *nothing
+    )
     return space, data
 
 
-def density(space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], settings) -> float:
-    """Log density of both joints' torque with every unknown integrated out by its covariance: no Gram matrices."""
+def density(
+    space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], settings, width: float
+) -> float:
+    """Log density of both joints' torque with every unknown integrated out by its covariance: no Gram matrices.
+
+    The inertials' prior is as many times as wide as stated as `width` says.
+    """
     columns = space.set_columns(chosen)
     shared, blocks = [], []
     for d, setting in zip(data, settings, strict=True):
         wide = np.zeros((ROWS, space.size))
         wide[:, d["mine"]] = d["X"]
+        wide[:, :INERTIALS] *= width
         shared.append(wide[:, columns])
         E = d["E"] * own_scale(GROUPS, setting)
         blocks.append(E @ E.T + LEVELS[setting[-1]] ** 2 * np.eye(ROWS))
@@ -74,23 +82,52 @@ def density(space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, 
 def test_the_evidence_of_a_set_is_the_density_of_the_data(chosen):
     space, data = planted(1, {0: 1.0, 5: 0.5})
     settings = (SETTING, (0, 2, 5, ONE))
-    expected = density(space, data, chosen, settings) + sum(map(log_prior, settings)) + len(chosen) * np.log(0.05)
+    widths = [density(space, data, chosen, settings, w) for w in WIDTHS] + LOG_PRIOR
+    expected = special.logsumexp(widths) + sum(map(log_prior, settings)) + len(chosen) * np.log(0.05)
     assert space.log_evidence(chosen, settings) == pytest.approx(expected, abs=1e-8)
+    assert space.width(chosen, settings) == WIDTHS[np.argmax(widths)]
 
 
-def test_screening_says_what_the_evidence_says():
-    space, _ = planted(2, {2: 1.0})
+def test_screening_says_what_the_evidence_says_at_the_width_of_the_inertials_of_the_set_before():
+    space, data = planted(2, {2: 1.0})
     settings, which = (SETTING, SETTING), np.array([0, 1, 3, 5])
-    before = space.log_evidence((2,), settings)
-    expected = [space.log_evidence((2, int(i)), settings) - before for i in which]
+    width = space.width((2,), settings)
+    before = density(space, data, (2,), settings, width)
+    expected = [density(space, data, (2, int(i)), settings, width) - before + np.log(0.05) for i in which]
     np.testing.assert_allclose(space.gains((2,), settings, which), expected, atol=1e-8)
+
+
+def test_the_prior_of_the_widths_is_a_probability():
+    assert np.exp(LOG_PRIOR).sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("chosen", [(), (0,), (0, 2), (0, 1, 2, 3)])
+def test_sites_of_a_kind_have_it_as_often_as_a_share_of_sites_that_is_the_robots_own(chosen):
+    """Integrated over that share, with a Beta distribution, instead of by Beta functions."""
+    kinds = Kinds(np.array([0, 0, 0, 1]), np.array([3, 1]), 0.05)
+    share = [stats.beta(0.05, n) for n in (3, 1)]
+
+    def density(kind: int, there: int) -> float:
+        n = kinds.number[kind]
+        x = lambda u: u ** (1.0 / 0.05)  # the density is without bounds at zero, and even in this variable
+        weight = lambda u: share[kind].pdf(x(u)) * x(u) ** (1.0 - 0.05) / 0.05
+        value, _ = integrate.quad(lambda u: weight(u) * x(u) ** there * (1.0 - x(u)) ** (n - there), 0.0, 1.0)
+        return float(np.log(value))
+
+    count = [sum(kinds.of[c] == k for c in chosen) for k in (0, 1)]
+    expected = sum(density(k, m) - density(k, 0) for k, m in enumerate(count))
+    assert kinds.log_prior(chosen) == pytest.approx(expected, abs=1e-6)
+    for c in set(range(4)) - set(chosen):
+        more = kinds.log_prior((*chosen, c)) - kinds.log_prior(chosen)
+        assert kinds.one_more(chosen)[c] == pytest.approx(more)
 
 
 def test_the_posterior_is_that_of_the_data():
     space, data = planted(3, {1: 1.0})
     settings, chosen = (SETTING, (2, 0, 0, ONE + 3)), (1, 4)
     mean, cov = space.posterior(chosen, settings)
-    columns, precision, moment = space.set_columns(chosen), np.eye(INERTIALS + COMMON + 2), 0.0
+    width = np.where(np.arange(INERTIALS + COMMON + 2) < INERTIALS, space.width(chosen, settings), 1.0)
+    columns, precision, moment = space.set_columns(chosen), np.diag(1.0 / width**2), 0.0
     for d, setting in zip(data, settings, strict=True):
         wide = np.zeros((ROWS, space.size))
         wide[:, d["mine"]] = d["X"]
@@ -189,26 +226,16 @@ def test_a_sets_shapes_are_summed_over_one_member_at_a_time():
             candidates[k] = dataclasses.replace(candidates[first], shape=np.array([float(k)]), columns=np.array([k]))
     space = dataclasses.replace(space, candidates=tuple(candidates))
     settings, chosen = (SETTING, SETTING), (0, 1, 6)
-    best, expected = density(space, data, chosen, settings), 0.0
+    expected = 0.0
     for member, points in ((1, shapes[1]), (6, shapes[5])):
         rest = tuple(c for c in chosen if c != member)
         sets = [tuple(sorted((*rest, k))) for k in points]
-        expected += np.logaddexp.reduce([density(space, data, s, settings) for s in sets]) - best
+        width = space.width(rest, settings)
+        values = [density(space, data, s, settings, width) for s in (*sets, chosen)]
+        expected += np.logaddexp.reduce(values[:-1]) - values[-1]
     assert expected > 0.0
     assert space.over_shapes(chosen, settings) == pytest.approx(expected, abs=1e-8)
     assert space.over_shapes((0,), settings) == 0.0
-
-
-def test_inertials_of_all_links_and_those_of_one_are_not_loose_at_once():
-    space, _ = planted(11, {})
-    free = np.full(1, np.inf)
-    loose = [Candidate(SILENT["inertials"], joints, np.zeros(0), np.array([k]), (0,), -free, free)
-             for k, joints in enumerate([(0,), (1,), (0, 1)])]  # fmt: skip
-    space = dataclasses.replace(space, candidates=(*space.candidates[:-3], *loose))
-    one, other, every = range(len(space.candidates) - 3, len(space.candidates))
-    assert space.conflicts((every,))[[one, other, every]].all()
-    assert space.conflicts((one,))[[one, every]].all() and not space.conflicts((one,))[other]
-    assert not space.conflicts((every,))[:one].any()  # beside any law
 
 
 def test_blocks_left_out_are_as_if_they_had_not_been_recorded():

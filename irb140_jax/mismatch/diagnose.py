@@ -20,7 +20,7 @@ from irb140_jax.mismatch.model import CorrectedModel, Named, scaled, torques_alo
 from irb140_jax.mismatch.motion import proof_in_motion
 from irb140_jax.mismatch.motion.windows import spans
 from irb140_jax.mismatch.native import beyond_file, native_gap
-from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, notes
+from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, inertial_notes, notes
 from irb140_jax.mismatch.nothing_compared import all_open
 from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, recordings_of_blocks, refitted
 from irb140_jax.mismatch.provenance import provenance
@@ -164,9 +164,9 @@ def _diagnosed(
     origin = provenance(robot, recordings, config.options, config.words)
     missing = undecidable(robot, proof, logged, scatter, band)
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
-    unnamed = [*friction_notes(ex, [r.source for r in smooth]), *discrepancy_notes(robot, proof)]
+    unnamed = inertial_notes(ex, config.inertial_uncertainty) + friction_notes(ex, [r.source for r in smooth])
+    unnamed += discrepancy_notes(robot, proof) + command_notes(ex, smooth[0].servo)
     coarse = coarse_positions(robot, *parts, proof.judged)
-    unnamed += command_notes(ex, smooth[0].servo)
     said = [*servo_notes, *open_joints, *unnamed, *coarse, *twice, *again, *usual, *gap]
     every = of_servos(ex, smooth[0].servo, [*found, *torque_scale_finding(robot, ex)])
     diagnosis = _document(robot, ex, proof, scatter, every, rest, missing, seen, said, origin)

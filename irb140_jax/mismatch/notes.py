@@ -48,6 +48,17 @@ def notes(
     return list(dict.fromkeys(out))
 
 
+def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
+    """A note where the inertials look wrong by clearly more than was stated."""
+    width = ex.space.width(ex.chosen, ex.settings)
+    if width <= 1.0:
+        return []
+    return [
+        f"The recordings suit inertial parameters that are wrong by about {100 * width * uncertainty:.0f} % better than "
+        f"the {100 * uncertainty:.3g} % that were stated; the diagnosis allows for it."
+    ]
+
+
 def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out: Sequence[str]) -> list[str]:
     """A note for every joint at which `corrected.xml` gives another torque than the corrected model.
 

@@ -17,6 +17,7 @@ from irb140_jax.mismatch.prove import HeldOut
 from irb140_jax.mismatch.rows import Stretch
 
 FEATURES = 60  # random Fourier features a competitor
+WAVES = 50  # along a joint's range, of the competitor that knows position and direction
 SHIFTS = 99  # circular time shifts that make the null
 MATERIAL_SHARE = 0.05  # of the remaining residual's variance; less is not worth a person's time
 MATERIAL_TORQUE = 0.02  # of the joint's torque RMS; below, what smoothing and imperfect laws leave
@@ -146,6 +147,8 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
     }
     fold = _motion_folds(stretches, rows)
     out = [Competitor(f"the joint's {name}", _features(x), fold, True) for name, x in groups.items()]
+    along = _along_the_range(mine(q), np.sign(rows.of([s.qd[:, [j]] for s in stretches])))
+    out.append(Competitor("the joint's position and its direction of motion", along, fold, True))
     out.append(Competitor("the joint's own past", _memory(stretches, j, rows), fold, True))
     for i, name in enumerate(names):
         if i != j:
@@ -187,6 +190,14 @@ def _features(x: np.ndarray) -> np.ndarray:
     omega = rng.normal(size=(x.shape[1], FEATURES)) * rng.choice([0.7, 1.5, 4.0], size=FEATURES)
     phase = rng.uniform(0, 2 * np.pi, FEATURES)
     return np.concatenate([np.cos(x @ omega + phase), x, np.sign(x)], axis=1)
+
+
+def _along_the_range(q: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Waves of position, from the whole range down to teeth of a gear, the same in either direction or not, (R, F)."""
+    x = (q - q.min()) / max(float(np.ptp(q)), 1e-12)
+    angle = 2.0 * np.pi * x * np.arange(1, WAVES + 1)
+    waves = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
+    return np.concatenate([waves, direction * waves, direction], axis=1)
 
 
 def _memory(stretches: list[Stretch], j: int, rows: Rows) -> np.ndarray:

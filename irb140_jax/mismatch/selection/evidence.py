@@ -97,11 +97,10 @@ class Space:
     def conflicts(self, chosen: tuple[int, ...]) -> np.ndarray:
         """Candidates that can't stand beside a set, shape (candidates,).
 
-        Beside what `Beside` says: one law a joint holds its level of dry friction, one shifts its log in time, and one
-        candidate frees the inertials of a link.
+        Beside what `Beside` says: one law a joint holds its level of dry friction, and one shifts its log in time.
         """
         out = self.beside.conflicts(chosen)
-        for alike in (self._dry, self._late, self._loose):
+        for alike in (self._dry, self._late):
             taken = np.any(self.at_joint[:, list(chosen)] & alike[list(chosen)], axis=1)
             out = out | (alike & np.any(self.at_joint & taken.reshape(-1, 1), axis=0))
         return out
@@ -121,10 +120,6 @@ class Space:
     @cached_property
     def _late(self) -> np.ndarray:
         return np.array([c.effect.logged > 1 for c in self.candidates])
-
-    @cached_property
-    def _loose(self) -> np.ndarray:
-        return np.array([c.slug == "inertials" for c in self.candidates])
 
     @cached_property
     def places(self) -> tuple[np.ndarray, ...]:
