@@ -12,7 +12,7 @@ from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
-FRICTION_LEVELS = SCALED.index("slope")  # dry friction of each recording about the mean over all
+FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
 NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
 
 
@@ -82,10 +82,10 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
 
 
 def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
-    """A note for every joint whose dry friction differs from recording to recording.
+    """A note for every joint whose friction differs from recording to recording.
 
-    Said where a level of friction of its own for each recording is more probable than one for all, against the odds of
-    any rare effect.
+    Said where friction of its own for each recording is more probable than one for all, against the odds of any rare
+    effect.
 
     Args:
         ex: The explanation.
@@ -99,11 +99,14 @@ def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
         gain = ex.space.log_evidence(ex.chosen, ex.settings) - ex.space.log_evidence(ex.chosen, alike)
         levels = ex.extra[0].groups[j] == FRICTION_LEVELS
         if levels.any() and gain > -np.log(RARE):
-            unit = "N" if ex.lib.robot.is_slide[j] else "N m"
-            each = (own[j] * ex.extra[0].units[j])[levels]
-            said = ", ".join(f"{x:+.3g} {unit} in {name}" for x, name in zip(each, names, strict=True))
+            units = ("N", "N s/m") if ex.lib.robot.is_slide[j] else ("N m", "N m s/rad")
+            dry, fast = (own[j] * ex.extra[0].units[j])[levels].reshape(2, -1)
+            said = ", ".join(
+                f"{d:+.3g} {units[0]} dry and {v / ex.scales.speed[j]:+.3g} {units[1]} viscous in {name}"
+                for d, v, name in zip(dry, fast, names, strict=True)
+            )
             joint = ex.lib.robot.joint_names[j]
-            out.append(f"The dry friction of {joint} differs between the recordings; relative to their mean: {said}.")
+            out.append(f"The friction of {joint} differs between the recordings; relative to their mean: {said}.")
     return out
 
 

@@ -85,9 +85,10 @@ def nuisances(
             gain = np.hypot(GAIN_JOINT, scale_width(motion, j)) * load[:, j]
             fixed = np.stack([gain, DELAY_JOINT * rate[:, j], rotor, bend[:, j], bias], axis=1)
             fixed = np.concatenate([fixed, servo_columns(motion, j)], axis=1)
-            # Levels of dry friction about their mean, which is a law's; of one recording there is nothing beside it.
-            own = (np.arange(count) == r) - 1.0 / count
-            slope = motion.direction[:, [j]] * (own if count > 1 else np.zeros(0))
+            # Levels of dry and viscous friction about their mean, a law's; of one recording there is nothing beside it.
+            own = (np.arange(count) == r) - 1.0 / count if count > 1 else np.zeros(0)
+            fast = motion.qd[:, [j]] / scales.speed[j]
+            slope = np.concatenate([motion.direction[:, [j]] * own, fast * own], axis=1)
             joints.append([band.apply(b) for b in (fixed, *features(motion, load, scales, j), slope)])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
