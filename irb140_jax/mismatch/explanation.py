@@ -129,6 +129,19 @@ class Explanation:
         post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
         return post, GAIN_COMMON * float(mean[space.inertials]), own
 
+    def beside_instrument(self, without: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+        """Inertials and amplitudes, common nuisances, and each joint's own fixed ones: nothing of the discrepancy.
+
+        Args:
+            without: Which blocks of the data are left out, shape (blocks,).
+        """
+        space = self.space.without(without)
+        mean, _ = space.posterior(self.chosen, self.settings)
+        columns, keep = space.set_columns(self.chosen), np.r_[0 : space.inertials, space.offset : len(mean)]
+        own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(self.settings)]
+        fixed = [np.where(g.groups < 0, v, 0.0) for g, v in zip(space.joints, own, strict=True)]
+        return mean[keep], mean[space.inertials : space.offset], fixed
+
     def of_bodies(self, mean: np.ndarray, cov: np.ndarray, chosen: tuple[int, ...], first: int) -> np.ndarray:
         """A posterior mean moved to the most probable inertials that bodies can have; all else moves along.
 

@@ -40,6 +40,8 @@ class HeldOut:
         nominal: Of the model as given.
         refit: Of the rigid body with refitted inertials.
         named: Of refit and findings together.
+        left: The same, with errors of the instrument at joints where they explain some of it: what smoothing takes off
+            accelerations is no physics.
         corrected: The same, with the discrepancy where it is carried.
         use: Rows that count, (R, n).
         carried: Joints at which the discrepancy makes the error on unseen data smaller, shape (n,).
@@ -49,6 +51,7 @@ class HeldOut:
     nominal: list[np.ndarray]
     refit: list[np.ndarray]
     named: list[np.ndarray]
+    left: list[np.ndarray]
     corrected: list[np.ndarray]
     use: list[np.ndarray]
     carried: np.ndarray
@@ -164,14 +167,16 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     seen = ex.posterior(instrument=False).mean
     bare = [s.of_rigid_body(refit.columns) for s in data.stretches]
     out = {"refit": [s.y.copy() for s in bare], "named": [s.y.copy() for s in data.stretches]}
-    out["flexible"] = [s.y.copy() for s in data.stretches]
-    gain, fits = np.zeros(len(ex.settings)), []
+    out["flexible"], out["left"] = ([s.y.copy() for s in data.stretches] for _ in range(2))
+    gains, fits = {"flexible": np.zeros(len(ex.settings)), "left": np.zeros(len(ex.settings))}, []
     for fold in folds(ex):
         post, scale, own = ex.prediction(fold)
         post = dataclasses.replace(post, mean=np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean))
         fits.append(Fold(fold, refit.posterior(fold), post, scale))
         corrected = post.mean * data.scale[post.columns]
         inertial = fits[-1].refit.mean * data.scale[refit.columns]
+        erring, common, errors = ex.beside_instrument(fold)
+        erring = np.where(_only_here(ex, ex.chosen, energy, fold), seen, erring) * data.scale[post.columns]
         for r, s in enumerate(data.stretches):
             mine = fold[recording == s.recording]
             edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
@@ -180,13 +185,23 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
                 out["refit"][r][rows] -= bare[r].X[rows] @ inertial
                 out["named"][r][rows] -= s.X[rows][..., post.columns] @ corrected
                 out["named"][r][rows] -= scale / GAIN_COMMON * ex.extra[r].common[rows, :, 0]
+                out["left"][r][rows] -= s.X[rows][..., post.columns] @ erring + ex.extra[r].common[rows] @ common
+                out["left"][r][rows] -= np.stack(
+                    [x[rows] @ v for x, v in zip(ex.extra[r].own, errors, strict=True)], axis=1
+                )
                 delta = np.stack([x[rows] @ v for x, v in zip(ex.extra[r].own, own, strict=True)], axis=1)
                 out["flexible"][r][rows] = out["named"][r][rows] - delta
-                old, new = (np.where(s.use[rows], out[k][r][rows], 0.0) for k in ("named", "flexible"))
-                gain += np.sum(old**2 - new**2, axis=0)
-    nominal, use, better = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches], gain > 0.0
-    carried = [np.where(better, f, c) for f, c in zip(out["flexible"], out["named"], strict=True)]
-    return HeldOut(nominal, out["refit"], out["named"], carried, use, better, tuple(fits))
+                for which, gain in gains.items():
+                    old, new = (np.where(s.use[rows], out[k][r][rows], 0.0) for k in ("named", which))
+                    gain += np.sum(old**2 - new**2, axis=0)
+    nominal, use = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches]
+    carried, left = (
+        [np.where(gains[k] > 0.0, better, named) for better, named in zip(out[k], out["named"], strict=True)]
+        for k in ("flexible", "left")
+    )
+    return HeldOut(
+        nominal, out["refit"], out["named"], left, carried, use, gains["flexible"] > 0.0, tuple(fits)
+    )
 
 
 def held_out_gains(ex: Explanation) -> dict[int, float]:

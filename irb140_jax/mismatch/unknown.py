@@ -92,7 +92,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
     """Joints whose residual, findings taken off, can be predicted on unseen data."""
     out = []
     torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
-    rmse = proof.rmse(proof.named)
+    rmse = proof.rmse(proof.left)
     for j in range(len(torque)):
         rows = _rows(ex, proof, j)
         least = max(MATERIAL_SHARE, (MATERIAL_TORQUE * torque[j] / max(rmse[j], 1e-100)) ** 2)
@@ -167,7 +167,7 @@ def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
         for r, (s, p) in enumerate(zip(ex.data.stretches, pick, strict=True))
     ])  # fmt: skip
     recording = np.repeat(np.arange(len(pick)), [p.sum() for p in pick])
-    y = np.concatenate([c[p, j] for c, p in zip(proof.named, pick, strict=True)]) / level
+    y = np.concatenate([c[p, j] for c, p in zip(proof.left, pick, strict=True)]) / level
     if len(y):
         limit = 6.0 * np.median(np.abs(y)) + 1e-12
         y = np.clip(y - np.mean(y), -limit, limit)
