@@ -45,7 +45,7 @@ def test_the_columns_of_the_skeleton_are_its_formula(extended):
     rigid = RigidBody(*(none,) * 10)
     rest = jnp.full(3, 1e-3)
     direction = jnp.tanh(jnp.asarray(qd) / rest)
-    torques = (q, q, q, q, q)
+    torques = (q, q, q, q)
     near_rest = (rest, direction)
     motion = Motion(jnp.arange(50.0), q, jnp.asarray(qd), q, *torques, rigid, *near_rest, jnp.array(0.0))
     law = extended["quadratic_drag"]

@@ -16,8 +16,8 @@ BAND = Band(20.0, 32.0, 200.0, 4)
 
 def proof(left: float, rows: int = 2000) -> HeldOut:
     """Errors of this size on a joint, on so many rows."""
-    error = np.full((rows, 1), left)
-    return HeldOut([error], [error], [error], [error], [error], [np.ones((rows, 1), dtype=bool)], np.zeros(1, dtype=bool))
+    error = [np.full((rows, 1), left)]
+    return HeldOut(error, error, error, error, error, [np.ones((rows, 1), dtype=bool)], np.zeros(1, dtype=bool))
 
 
 @pytest.mark.parametrize(

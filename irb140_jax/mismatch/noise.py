@@ -58,7 +58,7 @@ class Noise:
 
 
 def quieter(one: Noise, other: Noise) -> Noise:
-    """Of each joint the noise that is smaller: two explanations leave it, and nothing says that the larger is needed."""
+    """Of each joint the smaller noise: two explanations leave it, and nothing says that the larger is needed."""
     first = np.mean(one.total**2, axis=0) <= np.mean(other.total**2, axis=0)
     pick = lambda a, b: np.where(first.reshape(-1, *(1,) * (a.ndim - 1)), a, b)  # noqa: E731
     both = [(x.level.T, x.total.T) for x in (one, other)]

@@ -54,8 +54,8 @@ def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
     if width <= 1.0:
         return []
     return [
-        f"The recordings suit inertial parameters that are wrong by about {100 * width * uncertainty:.0f} % better than "
-        f"the {100 * uncertainty:.3g} % that were stated; the diagnosis allows for it."
+        f"The recordings suit inertial parameters that are wrong by about {100 * width * uncertainty:.0f} % better "
+        f"than the {100 * uncertainty:.3g} % that were stated; the diagnosis allows for it."
     ]
 
 

@@ -2,8 +2,9 @@
 
 Four zero-mean blocks of features a joint, each with a size of its own: what depends on position alone, friction that
 depends on speed alone, what depends on several of position, speed, direction and load, and what friction may do
-differently around a change of direction, by bristles or lateness.  None holds a term that a named effect consists of (a constant, the direction itself, position, speed, acceleration,
-load): the discrepancy stands for what no law explains, not for the laws.
+differently around a change of direction, by bristles or lateness.  None holds a term that a named effect consists of
+(a constant, the direction itself, position, speed, acceleration, load): the discrepancy stands for what no law
+explains, not for the laws.
 
 Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(3), 2001; the low rank as in Rasmussen
 and Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.

@@ -19,7 +19,8 @@ ROTOR = 0.10  # of the stated armature
 BIAS = 0.10  # of the joint's torque: what differs by direction may go on through a reversal, or vanish there
 # A joint's own columns with stated widths, in their order; those of a servo come after them.
 FIXED = ("gain", "delay", "rotor", "smoothing", "bias")
-SCALED = ("position", "speed", "smooth", "reversal", "slope")  # blocks of a joint whose size is learned from the recordings
+# Blocks of a joint whose size is learned from the recordings.
+SCALED = ("position", "speed", "smooth", "reversal", "slope")
 
 
 @dataclasses.dataclass(frozen=True)

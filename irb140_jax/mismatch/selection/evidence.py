@@ -11,6 +11,7 @@ from irb140_jax.mismatch.beside import Beside
 from irb140_jax.mismatch.candidates import Candidate
 from irb140_jax.mismatch.evidence import posterior, root, with_prior
 from irb140_jax.mismatch.regression.gram import LEVELS, SIZES, JointGram, Setting
+from irb140_jax.mismatch.selection.kinds import Kinds
 
 Settings = tuple[Setting, ...]  # one a joint
 DRY = "coulomb_friction"
@@ -18,42 +19,6 @@ DRY = "coulomb_friction"
 OCTAVES = np.arange(-1.0, 6.0)
 WIDTHS = 2.0**OCTAVES
 LOG_PRIOR = -np.log1p(OCTAVES**2) - special.logsumexp(-np.log1p(OCTAVES**2))  # a Cauchy distribution over octaves
-
-
-@dataclasses.dataclass(frozen=True)
-class Kinds:
-    """How probable it is that effects of one kind are at some of a robot's sites.
-
-    What a model leaves out at one joint it often leaves out at others: the share of sites is a robot's own, with a
-    Beta(sites, N) distribution over robots, so that `sites` of N sites have it on average (Beta and Bernoulli).
-
-    Attributes:
-        of: Kind of each candidate, below 0 where sites are independent, shape (candidates,).
-        number: Sites N of each kind, shape (kinds,).
-        sites: Expected number of sites that have it.
-    """
-
-    of: np.ndarray
-    number: np.ndarray
-    sites: float
-
-    def log_prior(self, chosen: Sequence[int]) -> float:
-        """Log odds of a set's sites against none."""
-        there = self._there(chosen)
-        return float(np.sum(self._log(there) - self._log(np.zeros_like(there))))
-
-    def one_more(self, chosen: Sequence[int]) -> np.ndarray:
-        """Log odds of each candidate's site beside a set, zero where sites are independent, shape (candidates,)."""
-        there = self._there(chosen)
-        odds = self._log(np.minimum(there + 1, self.number)) - self._log(there)
-        return np.where(self.of >= 0, np.append(odds, 0.0)[self.of], 0.0)
-
-    def _there(self, chosen: Sequence[int]) -> np.ndarray:
-        of = self.of[list(chosen)]
-        return np.bincount(of[of >= 0], minlength=len(self.number))
-
-    def _log(self, there: np.ndarray) -> np.ndarray:
-        return special.betaln(self.sites + there, 2.0 * self.number - there)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,7 +43,7 @@ class Space:
     offset: int
     size: int
     log_prior: np.ndarray
-    kinds: "Kinds"
+    kinds: Kinds
     lowest: np.ndarray
     highest: np.ndarray
     weights: np.ndarray
@@ -179,7 +144,7 @@ class Space:
         H, by_width = self._by_width(chosen, settings)
         if self._impossible(chosen, H, self.prior(chosen, settings)):
             return -np.inf
-        return self.constant(settings) + self._prior(chosen) + float(special.logsumexp(by_width))
+        return self.constant(settings) + self._prior(chosen) + float(np.logaddexp.reduce(by_width))
 
     def _by_width(self, chosen: Sequence[int], settings: Settings) -> tuple[np.ndarray, np.ndarray]:
         """Gram matrix of a set's columns and y, and log evidence and prior at each width of the inertials' prior."""
@@ -211,7 +176,8 @@ class Space:
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(settings, every, every)
         without = np.delete(np.delete(H, self.inertials, axis=0), self.inertials, axis=1)
-        return float(np.subtract(*(special.logsumexp(_by_width(x, self.inertials)) for x in (H, without))))
+        free, none = (float(np.logaddexp.reduce(_by_width(x, self.inertials))) for x in (H, without))
+        return free - none
 
     def _prior(self, chosen: Sequence[int]) -> float:
         return float(sum(self.log_prior[c] for c in chosen)) + self.kinds.log_prior(chosen)

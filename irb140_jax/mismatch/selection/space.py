@@ -9,7 +9,8 @@ from irb140_jax.mismatch.candidates import Candidate, Library
 from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.regression.gram import joint_grams
 from irb140_jax.mismatch.regression.nuisances import Nuisances
-from irb140_jax.mismatch.selection.evidence import Kinds, Space
+from irb140_jax.mismatch.selection.evidence import Space
+from irb140_jax.mismatch.selection.kinds import kinds_of
 
 RARE = 0.05  # expected number of sites of a robot at which an effect that few machines have is left out
 COMMON = 0.5  # probability of ordinary friction at a joint
@@ -54,21 +55,9 @@ def space_of(
             weights[i, :k], least[i] = s, c.lowest[0]
     return Space(
         joint_grams(data, extra, noise, blocks, sensors), candidates, data.nuisances, data.nuisances + common,
-        len(data.scale) + common, log_prior(data, lib, first), kinds_of(candidates), lowest, highest, weights,
+        len(data.scale) + common, log_prior(data, lib, first), kinds_of(candidates, RARE), lowest, highest, weights,
         least,
     )  # fmt: skip
-
-
-def kinds_of(candidates: Sequence[Candidate]) -> Kinds:
-    """Kinds of effects and their sites; ordinary friction is anywhere by itself."""
-    sites: dict[str, set[tuple[int, ...]]] = {}
-    for c in candidates:
-        if not c.effect.ordinary:
-            sites.setdefault(c.slug, set()).add(c.joints)
-    number = {slug: k for k, slug in enumerate(sites)}
-    return Kinds(
-        np.array([number.get(c.slug, -1) for c in candidates]), np.array([len(s) for s in sites.values()]), RARE
-    )
 
 
 def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
