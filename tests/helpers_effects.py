@@ -35,7 +35,7 @@ def rigid_body(rng, samples):
 def motion(seed=0, samples=60, rest_speed=RESTING):
     """Random motion, no joint slower than 0.01."""
     rng = np.random.default_rng(seed)
-    q, qd, qdd, load, total, *more = rng.normal(size=(8, samples, len(KINDS)))
+    q, qd, qdd, load, total, *more = rng.normal(size=(7, samples, len(KINDS)))
     qd += 0.01 * np.sign(qd)
     arrays = [jnp.asarray(x) for x in (q, qd, qdd, 9 * load, 10 * total, *more)]
     rigid = rigid_body(rng, samples)

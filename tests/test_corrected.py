@@ -93,18 +93,20 @@ def test_the_jax_model_gives_the_torque_that_predict_gives_with_every_effect_at_
     np.testing.assert_allclose(tau[:-3], fitted[:-3], rtol=0, atol=1e-6 * np.abs(fitted).max())
 
 
-def test_a_log_is_scaled_then_late_and_then_out_of_step():
-    some, m = model("torque_gain", "actuator_lag", "time_delay", phi=1.0), motion()
-    gain, lag, delay = VALUES["gain"], OWN["actuator_lag"]["time_constant"], VALUES["delay"]
+@pytest.mark.parametrize("shift", ["actuator_lag", "time_delay"])
+def test_a_log_is_scaled_and_then_late_or_out_of_step(shift):
+    some, m = model("torque_gain", shift, phi=1.0), motion()
     tau = torques_along(model(phi=1.0), as_conditioned(m)).corrected
     for j in some.named[0].joints:
-        tau[:, j] = tau[:, j] / gain
-    for j in some.named[1].joints:
-        tau[:, j] += lag * np.gradient(tau[:, j], m.t)
-    late = np.stack([np.interp(m.t + delay, m.t, x) for x in tau.T], axis=1)
+        tau[:, j] = tau[:, j] / VALUES["gain"]
+    if shift == "actuator_lag":
+        for j in some.named[1].joints:
+            tau[:, j] += OWN[shift]["time_constant"] * np.gradient(tau[:, j], m.t)
+    else:
+        tau = np.stack([np.interp(m.t + VALUES["delay"], m.t, x) for x in tau.T], axis=1)
     # A delay is the slope half way, right to third order.
-    np.testing.assert_allclose(torques_along(some, as_conditioned(m)).corrected[3:-3], late[3:-3], rtol=0,
-                               atol=1e-3 * np.abs(late).max())  # fmt: skip
+    np.testing.assert_allclose(torques_along(some, as_conditioned(m)).corrected[3:-3], tau[3:-3], rtol=0,
+                               atol=1e-3 * np.abs(tau).max())  # fmt: skip
 
 
 INSTANT = ("viscous_friction", "load_dependent_friction", "thermal_friction_drift", "torque_gain")

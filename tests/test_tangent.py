@@ -21,7 +21,7 @@ FOUND = (
     ("torque_gain", (1,), [0.15], []),
     ("actuator_lag", (0,), [0.04], []),
     ("actuator_lag", (1,), [0.02], []),
-    ("time_delay", (0, 1, 2), [0.008], [0.004]),
+    ("channel_skew", (2,), [0.008], [0.004]),
 )
 
 
@@ -53,7 +53,7 @@ def settled(model: CorrectedModel):
     lib, dphi = library_of(model.robot, model.named), (model.phi_corrected - np.asarray(ROBOT.phi)).ravel()
     along = seen_by(better_known(ROBOT, model.phi_corrected, model.named), prepared(ROBOT, SMOOTH))
     loads = None
-    for _ in range(6):  # a gain, a lag and a delay one after the other
+    for _ in range(6):  # a gain, and a lag or a delay after it
         torques = composed(lib, columns_along(lib, along, loads), lib.candidates, amplitudes_of(model), dphi, dphi)
         loads = torques.loads
     return lib, along, torques
