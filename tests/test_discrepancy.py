@@ -18,7 +18,7 @@ SIGN = np.tanh(QD / 0.01)
 
 
 def features() -> np.ndarray:
-    """All blocks along the motion, columns of RMS one, shape (T, 70)."""
+    """All blocks along the motion, columns of RMS one, shape (T, 82)."""
     column = lambda x: np.asarray(x)[:, None]  # noqa: E731
     motion = Conditioned(
         "motion", T, column(Q), column(QD), column(QDD), column(LOAD), np.ones((len(T), 1), bool), np.array([0.01]),

@@ -319,7 +319,7 @@ def test_what_mjcf_expresses_is_the_same_in_the_model_as_beside_it(effect):
     rng = np.random.default_rng(2)
     q, qd, qdd = rng.normal(size=(3, 5, 1))
     tau = [np.stack([dynamics.inverse_dynamics(arm, *x) for x in zip(q, qd, qdd, strict=True)]) for arm in arms]
-    arrays = [jnp.asarray(x) for x in (q, qd, qdd, q, q, q, q, q)]
+    arrays = [jnp.asarray(x) for x in (q, qd, qdd, q, q, q, q)]
     near_rest = {"rest_speed": jnp.full(1, RESTING), "direction": jnp.sign(arrays[1])}
     m = Motion(jnp.arange(5.0), *arrays, rigid=rigid_body(rng, 5), **near_rest, recording=jnp.array(0.0))
     w, shape = effect.amplitudes({effect.parameters[0].name: 0.7})

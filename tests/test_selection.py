@@ -108,11 +108,11 @@ def test_sites_of_a_kind_have_it_as_often_as_a_share_of_sites_that_is_the_robots
     kinds = Kinds(np.array([0, 0, 0, 1]), np.array([3, 1]), 0.05)
 
     def log_of(n: int, there: int) -> float:
-        """Of u = share^0.05: the density of the share has no bound at zero, and that of u is even there."""
+        """Of u = share^0.1: the density of the share has no bound at zero, and that of u is even there."""
 
         def integrand(u: float) -> float:
-            share = u**20.0
-            return share**there * (1.0 - share) ** (n - there) * (1.0 - share) ** (n - 1.0)
+            share = u**10.0
+            return share**there * (1.0 - share) ** (n - there) * (1.0 - share) ** n
 
         return float(np.log(integrate.quad(integrand, 0.0, 1.0)[0]))
 

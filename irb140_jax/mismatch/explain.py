@@ -11,7 +11,7 @@ from irb140_jax.mismatch.assemble import BLOCKS, assemble
 from irb140_jax.mismatch.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.explanation import Explanation, fitted, parts
 from irb140_jax.mismatch.model import Named, Torques, better_known, composed, library_of
-from irb140_jax.mismatch.noise import Noise, quieter
+from irb140_jax.mismatch.noise import Noise
 from irb140_jax.mismatch.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.nuisances import nuisances
 from irb140_jax.mismatch.rows import stretch
@@ -56,7 +56,6 @@ def explain(
     loads: list[Loads | None] = [None] * len(recordings)
     at: Point | None = None
     chosen: tuple[int, ...] = ()
-    first_noise: Noise | None = None
     noise: Noise | None = None
 
     def explained(turn: int, blocks: int) -> Explanation:
@@ -77,9 +76,7 @@ def explain(
         progress(f"searching sets of explanations (round {turn})")
         known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in zip(along, loads, strict=True)]
         extra = nuisances(robot, along, known, band, scales)
-        nonlocal first_noise
-        first_noise = first_noise or flexible_noise(data, extra)
-        whitening = quieter(noise or first_noise, first_noise)
+        whitening = noise or flexible_noise(data, extra)
         space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1)
         # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
         best, settings, sets = selected(space, chosen, every_move=turn == 1 or blocks > 1)

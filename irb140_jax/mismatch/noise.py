@@ -57,15 +57,6 @@ class Noise:
         return runs == lags + 1
 
 
-def quieter(one: Noise, other: Noise) -> Noise:
-    """Of each joint the smaller noise: two explanations leave it, and nothing says that the larger is needed."""
-    first = np.mean(one.total**2, axis=0) <= np.mean(other.total**2, axis=0)
-    pick = lambda a, b: np.where(first.reshape(-1, *(1,) * (a.ndim - 1)), a, b)  # noqa: E731
-    both = [(x.level.T, x.total.T) for x in (one, other)]
-    level, total = (pick(a, b).T for a, b in zip(*both, strict=True))
-    return Noise(pick(one.ar, other.ar), level, total, pick(one.alike, other.alike))
-
-
 def spread(unsure: np.ndarray | float, total: np.ndarray | float) -> np.ndarray:
     """Standard deviation of a row over that of the noise, where `unsure` [N m or N] comes on top of the noise."""
     return np.sqrt(1.0 + (np.asarray(unsure) / total) ** 2)

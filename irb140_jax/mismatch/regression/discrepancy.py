@@ -23,7 +23,7 @@ ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which friction near
 LATE = (-0.01, -0.005, 0.005, 0.01, 0.02)  # s by which friction turns before or after the joint
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
-FEATURES = 70  # of all blocks
+FEATURES = 82  # of all blocks
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,10 +84,11 @@ def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> list[n
     fast = 1.0 + 2.0 * np.log(np.abs(r.qd[:, j]) / scales.speed[j] + 1e-3) / np.log(1e3)
     speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
     qd, direction = r.qd[:, [j]], r.direction[:, [j]]
-    rounded = direction - qd / (np.abs(qd) + np.array(ROUNDED) * scales.speed[j])
+    slow = np.array(ROUNDED) * scales.speed[j]
+    rounded, tails = direction - qd / np.hypot(qd, slow), direction - qd / (np.abs(qd) + slow)
     carried = load[:, j] / max(float(scales.torque[j]), 1e-12)
-    smooth, reversal = _smooth(r, carried, j, position, speed), _reversal(r, load, carried, scales, j)
-    return [position[:, 1:], rounded, smooth, reversal]
+    smooth, reversal = _smooth(r, carried, j, position, speed), _reversal(r, load, carried, scales, j, rounded)
+    return [position[:, 1:], np.concatenate([rounded, tails], axis=1), smooth, reversal]
 
 
 def _smooth(r: Conditioned, carried: np.ndarray, j: int, position: np.ndarray, speed: np.ndarray) -> np.ndarray:
@@ -104,18 +105,21 @@ def _smooth(r: Conditioned, carried: np.ndarray, j: int, position: np.ndarray, s
     return np.concatenate([p.reshape(len(position), -1) for p in parts], axis=1)
 
 
-def _reversal(r: Conditioned, load: np.ndarray, carried: np.ndarray, scales: Scales, j: int) -> np.ndarray:
-    """What happens around one joint's reversals and along its slopes, shape (T, 29)."""
+def _reversal(
+    r: Conditioned, load: np.ndarray, carried: np.ndarray, scales: Scales, j: int, rounded: np.ndarray
+) -> np.ndarray:
+    """What happens around one joint's reversals and along its slopes, shape (T, 37)."""
     q, qd, qdd, dt = r.q[:, j], r.qd[:, j], r.qdd[:, j], float(np.mean(np.diff(r.t)))
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
     base = [_relaxed(q, share * travel) - direction for share in TRAVEL]
     rest = float(scales.rest_speed[j])
     base += [np.tanh((qd + late * qdd) / rest) - direction for late in LATE]
-    X, even = np.stack(base, axis=1), np.abs(carried)[:, None]
+    alone = np.stack(base, axis=1)
+    X, even = np.concatenate([alone, rounded], axis=1), np.abs(carried)[:, None]
     pushed = np.abs(qdd)[:, None] / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
     slopes = np.stack([np.gradient(load[:, j], dt), np.gradient(qdd, dt)], axis=1)
-    return np.concatenate([X, X * even, X * pushed, slopes], axis=1)
+    return np.concatenate([alone, X * even, X * pushed, slopes], axis=1)
 
 
 def _relaxed(q: np.ndarray, travel: float) -> np.ndarray:
