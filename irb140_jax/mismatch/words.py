@@ -15,7 +15,6 @@ from irb140_jax.robot import Robot
 CLEARLY_BETTER = np.log(100.0)  # log odds that refitted inertials need over the nominal ones
 FEW_LINKS = 2  # of which the summary says by how much their inertials are wrong
 NOTABLE_SHIFT = 3.0  # standard deviations by which a link's inertials must change to be worth a sentence
-WRONG_INERTIALS = "wrong beyond their stated uncertainty"  # in sentences that the summary repeats
 
 
 def verdict(
@@ -73,13 +72,14 @@ def inertial_views(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         sentence = ""
         if k in loose:
             sentence = (
-                f"From the link behind {name} onwards, inertial parameters are {WRONG_INERTIALS} of "
-                f"{100 * uncertainty:.3g} %: refitting them changes the torque of {_torque_change(robot, ex, dphi, k)}."
+                f"From the link behind {name} onwards, inertial parameters are wrong beyond their stated "
+                f"uncertainty of {100 * uncertainty:.3g} %: refitting them changes the torque of "
+                f"{_torque_change(robot, ex, dphi, k)}."
             )
         elif shift > NOTABLE_SHIFT:
             sentence = (
-                f"Inertial parameters of the link behind {name} are {WRONG_INERTIALS} of {100 * uncertainty:.3g} %: "
-                f"refitting changes one by {shift:.1f} times as much."
+                f"Refitting changes the inertial parameters of the link behind {name} by {shift:.1f} standard "
+                "deviations of their stated uncertainty."
             )
         out.append({
             "link": name, "shift_sigma": shift, "mass_nominal": float(robot.mass[k]),
@@ -163,12 +163,12 @@ def summary(
             said.append(
                 f"{_capital(title)} on {joints} may instead be {rivals}, in whole or in part; these data can't tell."
             )
-    wrong = [i for i in inertials if WRONG_INERTIALS in i["sentence"]]
-    if len(wrong) > FEW_LINKS:
-        said.append(f"Inertial parameters of the links behind {_listed([i['link'] for i in wrong])} are "
-                    f"{WRONG_INERTIALS}.")  # fmt: skip
+    changed = [i for i in inertials if i["sentence"]]
+    if len(changed) > FEW_LINKS:
+        said.append(f"Refitting changes the inertial parameters of the links behind "
+                    f"{_listed([i['link'] for i in changed])} beyond their stated uncertainty.")  # fmt: skip
     else:
-        said += [i["sentence"] for i in wrong]
+        said += [i["sentence"] for i in changed]
     if rest and kind != "unexplained":
         joints = _listed([robot.joint_names[u.joint] for u in rest])
         said.append(f"On {joints} structure is left in the torque that no effect of the library explains.")
