@@ -17,8 +17,8 @@ LOAD = 5.0 * np.cos(Q) + 0.3 * QDD
 SIGN = np.tanh(QD / 0.01)
 
 
-def features() -> np.ndarray:
-    """All blocks along the motion, columns of RMS one, shape (T, 82)."""
+def features(only: slice = slice(None)) -> np.ndarray:
+    """Blocks along the motion, by default all of them, columns of RMS one, shape (T, 82)."""
     column = lambda x: np.asarray(x)[:, None]  # noqa: E731
     motion = Conditioned(
         "motion", T, column(Q), column(QD), column(QDD), column(LOAD), np.ones((len(T), 1), bool), np.array([0.01]),
@@ -27,13 +27,14 @@ def features() -> np.ndarray:
     one = lambda x: np.array([x])  # noqa: E731
     scales = Scales(one(np.abs(QD).max()), one(0.01), one(np.sqrt(np.mean(LOAD**2))), one(Q.min()), one(Q.max()), 20.0,
                     one(0.3), one(0.0))  # fmt: skip
-    X = np.concatenate(blocks(motion, column(LOAD), scales, 0), axis=1)
+    X = np.concatenate(blocks(motion, column(LOAD), scales, 0)[only], axis=1)
     return X / np.sqrt(np.mean(X**2, axis=0))
 
 
-def explained(y: np.ndarray, size: float) -> float:
+def explained(y: np.ndarray, size: float, only: slice = slice(None)) -> float:
     """Share of a torque of RMS one that the discrepancy explains, noise of 1 % beside a discrepancy of some RMS."""
-    X, y = features() * size / np.sqrt(features().shape[1]), y / np.sqrt(np.mean(y**2))
+    X, y = features(only), y / np.sqrt(np.mean(y**2))
+    X = X * size / np.sqrt(X.shape[1])
     w = np.linalg.solve(X.T @ X + 1e-4 * np.eye(X.shape[1]), X.T @ y)
     return 1.0 - float(np.mean((y - X @ w) ** 2))
 
@@ -64,3 +65,17 @@ def test_friction_that_turns_late_differs_by_what_the_discrepancy_holds():
 
 def test_friction_along_the_range_is_held_by_the_smooth_block():
     assert explained(SIGN * np.exp(-(((Q - 0.2) / 0.6) ** 2)) - 0.5 * SIGN, 1.0) > 0.6
+
+
+def test_a_spring_that_hardens_differs_from_a_linear_one_by_what_the_block_of_position_holds():
+    linear = np.linalg.qr(np.stack([np.ones_like(Q), Q], axis=1))[0]
+    beside = lambda x: x - linear @ (linear.T @ x)  # noqa: E731
+    X, bend = beside(features(slice(0, 1))), beside(np.sinh(2.0 * Q))
+    left = bend - X @ np.linalg.lstsq(X, bend, rcond=None)[0]
+    assert np.sum(left**2) < 1e-3 * np.sum(bend**2)
+
+
+@pytest.mark.parametrize("still", [0.003, 0.03])
+def test_friction_that_nears_its_level_slowly_differs_from_dry_friction_by_what_the_block_of_speed_holds(still):
+    slow = 2.0 / np.pi * np.arctan(QD / (still * np.abs(QD).max()))
+    assert explained(slow - SIGN, 1.0, slice(1, 2)) > 0.95

@@ -6,9 +6,11 @@ import re
 
 import equinox as eqx
 import helpers_recordings as made
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import irb140_jax as irb
 from irb140_jax.errors import RecordingError
@@ -171,6 +173,13 @@ def test_a_zero_far_off_is_recognised_with_its_offset(robot, tmp_path, offset):
     message = refusal(changed(sound, q=sound.q + np.array([0.0, offset, 0.0])), robot, tmp_path)
     (said,) = re.findall(r'"q.elbow" = (\S+?),', message)
     assert float(said) == pytest.approx(-offset, abs=0.15)
+
+
+def test_a_centre_of_mass_that_hangs_elsewhere_on_the_last_link_is_no_wrong_zero(robot, tmp_path):
+    sound = made.recording(seed=1, speeds=False)
+    com, axis = np.array(robot.com), np.asarray(robot.axis)[-1]
+    com[-1] = Rotation.from_rotvec(1.2 * axis).apply(com[-1])
+    read(sound, eqx.tree_at(lambda r: r.com, robot, jnp.asarray(com)), tmp_path)
 
 
 def test_a_drive_that_lags_by_much_is_no_reversed_torque(tmp_path):

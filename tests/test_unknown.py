@@ -85,3 +85,16 @@ def test_what_one_recording_leaves_is_seen_to_go_with_time_however_much_louder_i
     time = competitors([one, one], 0, rows, ("hinge",))[-1]
     assert time.variable.startswith("time")
     assert 0.4 < predicted(time, rows.residual[:, None])[0] < 0.6  # all of one recording, nothing of the other
+
+
+def test_what_the_teeth_of_a_gear_leave_goes_with_position_and_direction():
+    t = 0.02 * np.arange(1500)
+    q = np.sin(0.7 * t) + 0.5 * np.sin(1.1 * t + 1.0)
+    qd = 0.7 * np.cos(0.7 * t) + 0.55 * np.cos(1.1 * t + 1.0)
+    columns = {"q": q, "qd": qd, "qdd": np.gradient(qd, t), "nominal": np.cos(q)}
+    one: Any = SimpleNamespace(t=t, **{k: v[:, None] for k, v in columns.items()})
+    teeth = np.sign(qd) * np.sin(2.0 * np.pi * 9.0 * q)
+    rows = Rows([np.full(1500, True)], teeth, np.ones(1500), np.zeros(1500, int))
+    shares = {c.variable: predicted(c, rows.residual[:, None])[0] for c in competitors([one], 0, rows, ("hinge",))}
+    along = shares.pop("the joint's position and its direction of motion")
+    assert along > 0.8 and max(shares.values()) < 0.5

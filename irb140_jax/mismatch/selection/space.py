@@ -74,7 +74,7 @@ def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
     def rare(c: Candidate) -> float:
         alike, prior = kinds[c.slug, c.joints], -np.log(c.effect.scanned)
         if c.effect.shape_follows:
-            # No parameter of its own: those that some amplitude may have share its prior, half of it either side of zero.
+            # No parameter of its own: those that some amplitude may have share its prior, half either side of zero.
             least, most = np.array([o.effect.at_shape(o.shape) for o in alike])[:, :, 0].T
             middle = np.mean(c.effect.at_shape(c.shape))
             return float(prior - np.log(2.0 * np.sum((least <= middle) & (middle < most))))
