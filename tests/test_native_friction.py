@@ -11,7 +11,7 @@ def test_what_mujoco_itself_calls_friction_damping_and_armature_is_named():
 
     friction = {("coulomb_friction", "shoulder"): 0.2, ("viscous_friction", "lift"): 25.0}
     hidden = friction | {("rotor_inertia", "elbow"): 0.04}
-    assert named(SCARA, hide, 0) == pytest.approx(hidden, rel=0.03)
+    assert named(SCARA, hide, 0) == pytest.approx(hidden, rel=0.04)
 
 
 @pytest.mark.parametrize("seed", [0, 1])

@@ -105,7 +105,7 @@ def test_the_correction_takes_off_half_of_what_refitting_leaves_on_unseen_data(e
     for joint in fit:
         # Where nothing is hidden, inertials that also have to suit the other joint may err by a little more.
         within = max(fit[joint]["rmse_refit"], fit[joint]["noise_floor"])
-        assert fit[joint]["rmse_corrected"] <= 1.1 * within
+        assert fit[joint]["rmse_corrected"] <= 1.12 * within
         # Heavier links stand in for much of a rotor; what they can't is below the noise here.
         if joint in HIDDEN_ON[effect] and effect != "rotor_inertia":
             assert beyond_noise(joint, "rmse_corrected") < 0.5 * beyond_noise(joint, "rmse_refit")
