@@ -9,6 +9,7 @@ results/testbed_probes.jsonl, each in the place of its former one.
 
 import json
 import pathlib
+import subprocess
 import sys
 from typing import Any
 
@@ -66,9 +67,10 @@ def main() -> None:
     from irb140_jax.compilation_cache import set_up_compilation_cache
 
     set_up_compilation_cache()
+    engine = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout
     for name in sys.argv[1:] or PROBES:
         sentence, make = PROBES[name]
-        line = json.loads(json.dumps(runner.compact(runner.judged(make()))))
+        line = json.loads(json.dumps(runner.compact(runner.judged(make())))) | {"engine": engine.strip()}
         keep(name, line)
         print(f"{name}: {sentence}\n    {row(line)}", flush=True)
 

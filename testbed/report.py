@@ -119,9 +119,24 @@ def probe_row(line: dict[str, Any]) -> tuple[str, ...]:
     at = [f"{', '.join(u['joints'])} {100 * u['share']:.0f} %" for u in said["unexplained"]]
     return (
         PROBES[line["probe"]][0], "; ".join(map(_short, scoring.false_names(line))) or "none",
-        f"{np.max(scoring.floors(line)):.2f}", f"{holding} of {len(found)}", "; ".join(at) or "none",
+        f"{np.max(scoring.floors(line)):.2f}", f"{holding} of {len(found)}", _gains(line), "; ".join(at) or "none",
         f"{scoring.unseen_ratio(line):.3g}", said["verdict"] + ("" if scoring.verdict_right(line) else " (wrong)"),
     )  # fmt: skip
+
+
+def _gains(line: dict[str, Any]) -> str:
+    gains = scoring.gains(line)
+    return f"{sum(gains)} of {len(gains)}" if gains else ""
+
+
+def narrower(lines: Lines) -> str:
+    """Standard deviations of the files given five times over those of the same given once, median and least."""
+    by = {x["probe"]: scoring.intervals(x) for x in lines}
+    if not {"plain", "five_times"} <= by.keys():
+        return ""
+    once = {(e, p, true): std for e, p, _, std, true in by["plain"]}
+    ratios = [std / once[e, p, true] for e, p, _, std, true in by["five_times"] if (e, p, true) in once]
+    return f"{np.median(ratios):.2f} (least {np.min(ratios):.2f}, {len(ratios)} intervals)"
 
 
 def _short(finding: dict[str, Any]) -> str:
@@ -180,8 +195,8 @@ def main() -> None:
         diagram.draw([x for x in every if x["diagnosis"]], ROOT / "docs" / "figures" / f"calibration_{name}.svg")
     probes = [x for x in runner.read(runner.RESULTS / "testbed_probes.jsonl") if x["diagnosis"]]
     many = collections.Counter(cases.PASS)
-    head = ("probe", "false names", "noise over the sensors', largest", "90 % intervals that hold", "unexplained",
-            "unseen error over refit's", "verdict")  # fmt: skip
+    head = ("probe", "false names", "noise over the sensors', largest", "90 % intervals that hold",
+            "gains within 5 %", "unexplained", "unseen error over refit's", "verdict")  # fmt: skip
     text = jinja2.Environment(keep_trailing_newline=True, trim_blocks=False).from_string(
         (pathlib.Path(__file__).parent / "calibration.md.j2").read_text(encoding="utf-8")
     ).render(
@@ -189,6 +204,7 @@ def main() -> None:
         looks=[{"engine": engines(look), "cases": len(look)} for look in looks],
         draws=[section(name, every, runner.read(runner.stored(name, "first"))) for name, every in draws.items()],
         probes=markdown(head, [probe_row(x) for x in probes]) if probes else "", probes_engine=engines(probes),
+        narrower=narrower(probes),
     )  # fmt: skip
     (ROOT / "docs" / "calibration.md").write_text(text, encoding="utf-8")
 
