@@ -114,6 +114,22 @@ def gears(results: dict) -> list[str]:
     ]  # fmt: skip
 
 
+def varied(result: dict[str, dict[str, list[str]]]) -> list[str]:
+    """Which names are lost and which come in where the same recordings are given in another way."""
+    rows = []
+    for machine, by_variation in result.items():
+        given, *others = by_variation.items()
+        for name, said in others:
+            lost, more = ("; ".join(x for x in a if x not in b) or "none" for a, b in ((given[1], said), (said, given[1])))
+            rows.append(f"| `{machine}` | {name} | {len(given[1])} | {lost} | {more} |")
+    return [
+        "## The same recordings given in another way", "",
+        "Every recording at half its sampling rate, without its first second, and cut in two",
+        "(`experiments/real_machines_varied.py`). The machine is the same, so the names should be.", "",
+        "| machine | variation | names as logged | lost | more |", "|---|---|---|---|---|", *rows, "",
+    ]  # fmt: skip
+
+
 def legs(result: dict) -> list[str]:
     """What was named of a quadruped's legs from commands alone, and errors beside the baseline."""
     out = [
@@ -217,6 +233,8 @@ def main() -> None:
         "says where the data come from.", "",
         *servo(read("bam_xl330")), "", *gears(read("cycloidal_play")), "",
     ]  # fmt: skip
+    if (config.results / "real_machines_varied.json").is_file():
+        lines += varied(json.loads((config.results / "real_machines_varied.json").read_text(encoding="utf-8")))
     sections = {"servo_bam_xl330": pendulum, "servo_unitree_go2": legs, "servo_so101": arm}
     for name, section in sections.items():
         if (config.results / f"real_{name}.json").is_file():
