@@ -120,7 +120,8 @@ def varied(result: dict[str, dict[str, list[str]]]) -> list[str]:
     for machine, by_variation in result.items():
         given, *others = by_variation.items()
         for name, said in others:
-            lost, more = ("; ".join(x for x in a if x not in b) or "none" for a, b in ((given[1], said), (said, given[1])))
+            pairs = ((given[1], said), (said, given[1]))
+            lost, more = ("; ".join(x for x in a if x not in b) or "none" for a, b in pairs)
             rows.append(f"| `{machine}` | {name} | {len(given[1])} | {lost} | {more} |")
     return [
         "## The same recordings given in another way", "",

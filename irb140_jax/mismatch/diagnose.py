@@ -131,7 +131,7 @@ def _diagnosed(
     progress("smoothing and differentiating the positions")
     band, recordings, smooth, again = comparable(robot, recordings)
     if reason := too_little(smooth, band):
-        return _nothing_compared(robot, recordings, smooth, band, config, reason, [*servo_notes, *twice, *again])
+        return _without_comparison(robot, recordings, smooth, band, config, reason, [*servo_notes, *twice, *again])
     parts = scatter_by_sensor(robot, recordings, smooth, band)
     scatter = np.hypot(*parts)
     ex = explain(robot, smooth, band, config.effects, config.inertial_uncertainty, scatter, progress)
@@ -194,7 +194,7 @@ def _motion(
     return rounded(proof_in_motion(robot, of_fold, unseen, smooth, beyond))
 
 
-def _nothing_compared(
+def _without_comparison(
     robot: Robot, recordings: Sequence[Recording], smooth: Sequence[Conditioned], band: Band, config: DiagnoseConfig,
     reason: str, repaired: list[str],
 ) -> Result:  # fmt: skip
