@@ -150,7 +150,7 @@ class Space:
         """Gram matrix of a set's columns and y, and log evidence and prior at each width of the inertials' prior."""
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(settings, every, every)
-        by_width = _by_width(H, self.inertials)
+        by_width = _width_evidences(H, self.inertials)
         self._widths[tuple(sorted(chosen)), settings] = float(WIDTHS[np.argmax(by_width)])
         return H, by_width
 
@@ -176,7 +176,7 @@ class Space:
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(settings, every, every)
         without = np.delete(np.delete(H, self.inertials, axis=0), self.inertials, axis=1)
-        free, none = (float(np.logaddexp.reduce(_by_width(x, self.inertials))) for x in (H, without))
+        free, none = (float(np.logaddexp.reduce(_width_evidences(x, self.inertials))) for x in (H, without))
         return free - none
 
     def _prior(self, chosen: Sequence[int]) -> float:
@@ -391,7 +391,7 @@ def _near(setting: Setting, lowest: int) -> list[Setting]:
     return out
 
 
-def _by_width(H: np.ndarray, inertials: int) -> np.ndarray:
+def _width_evidences(H: np.ndarray, inertials: int) -> np.ndarray:
     """Log evidence and prior of each width of the inertials' prior, which come first in a Gram matrix, (WIDTHS,)."""
     prior = np.ones((len(WIDTHS), len(H) - 1))
     prior[:, :inertials] = WIDTHS[:, None]
