@@ -149,8 +149,8 @@ def channel_doubts(
         several = changed.sum() > 1
         if np.mean(given[changed]) > BADLY and not (several and np.min(after[changed]) > SURE):
             continue
-        # What another zero does to one joint alone, another centre of mass of its link does, too.
-        if doubt.kind == "zero" and not several:
+        # What another zero or a turned axis does to one joint alone, another centre of mass of its link does, too.
+        if doubt.kind in ("zero", "reversed axis") and not several:
             continue
         gain = float(np.sum(np.log((1.0 - given[judged] + 0.01) / (1.0 - after[judged] + 0.01)))) - cost
         if gain > 0.0 and (best is None or gain > best[0] + 0.5):
