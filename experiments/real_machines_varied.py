@@ -17,6 +17,7 @@ import tyro
 from real_bam_xl330 import JUDGED
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
+from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import diagnose
 from irb140_jax.recordings import Recording, read_recording, write_recording
 from irb140_jax.recordings.machines.bam_xl330 import servo_runs, write_servo
@@ -74,6 +75,8 @@ def main() -> None:
     """Diagnose every variation of every machine, print and store the names."""
     config = tyro.cli(Config)
     set_up_compilation_cache()
+    config.out.mkdir(parents=True, exist_ok=True)
+    kept = config.out / "real_machines_varied.json"
     results: dict[str, dict[str, list[str]]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for machine, robot, recordings in machines(pathlib.Path(folder)):
@@ -82,14 +85,15 @@ def main() -> None:
                 for i, part in enumerate(part for r in recordings for part in vary(r)):
                     # Through a file, as a user's recording comes.
                     path = write_recording(part, pathlib.Path(folder) / f"{i}.parquet")
-                    varied.append(read_recording(path, robot))
+                    try:
+                        varied.append(read_recording(path, robot))
+                    except RecordingError as error:  # half a run may hold nothing but rest
+                        print(f"left out: {error}", flush=True)
                 found = diagnose(robot, varied).diagnosis["findings"]
                 said = sorted(f"{f['effect']} on {', '.join(f['joints'])}" for f in found)
                 results.setdefault(machine, {})[name] = said
                 print(f"{machine}, {name}: {'; '.join(said) or 'nothing'}", flush=True)
-    config.out.mkdir(parents=True, exist_ok=True)
-    path = config.out / "real_machines_varied.json"
-    path.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+                kept.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
