@@ -26,7 +26,7 @@ def made(options: dict[str, Any]) -> dict[str, Any]:
         options: What its script was told.
     """
     return {
-        "commit": _commit(), "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d"),
+        "commit": commit(), "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d"),
         "python": platform.python_version(),
         "versions": {name: importlib.metadata.version(name) for name in PACKAGES},
         "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}",
@@ -47,7 +47,7 @@ def store(frame: pd.DataFrame, path: pathlib.Path) -> None:
     part.replace(path)
 
 
-def _commit() -> str:
+def commit() -> str:
     """The commit that is checked out; marked where the code in the folder is not it."""
     git = lambda *words: subprocess.run(["git", "-C", str(ROOT), *words], capture_output=True, text=True)  # noqa: E731
     told = git("rev-parse", "--short=12", "HEAD")

@@ -9,11 +9,11 @@ results/testbed_probes.jsonl, each in the place of its former one.
 
 import json
 import pathlib
-import subprocess
 import sys
 from typing import Any
 
 import numpy as np
+import study_provenance
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))  # testbed/ stands beside experiments/ and is installed by nobody
@@ -67,10 +67,10 @@ def main() -> None:
     from irb140_jax.compilation_cache import set_up_compilation_cache
 
     set_up_compilation_cache()
-    engine = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout
+    engine = study_provenance.commit()
     for name in sys.argv[1:] or PROBES:
         sentence, make = PROBES[name]
-        line = json.loads(json.dumps(runner.compact(runner.judged(make())))) | {"engine": engine.strip()}
+        line = json.loads(json.dumps(runner.compact(runner.judged(make())))) | {"engine": engine}
         keep(name, line)
         print(f"{name}: {sentence}\n    {row(line)}", flush=True)
 

@@ -15,10 +15,11 @@ from irb140_jax.mismatch.selection.kinds import Kinds
 
 Settings = tuple[Setting, ...]  # one a joint
 DRY = "coulomb_friction"
-# True over stated error of the inertials, in octaves: half of all statements are right within a factor of two.
+# True over stated error of the inertials, in octaves: five of six statements are right within a factor of two, and some
+# are far too small.
 OCTAVES = np.arange(-1.0, 6.0)
 WIDTHS = 2.0**OCTAVES
-LOG_PRIOR = -np.log1p(OCTAVES**2) - special.logsumexp(-np.log1p(OCTAVES**2))  # a Cauchy distribution over octaves
+LOG_PRIOR = -np.log1p(OCTAVES**2) - special.logsumexp(-np.log1p(OCTAVES**2))  # a Cauchy distribution, cut off
 
 
 @dataclasses.dataclass(frozen=True)
