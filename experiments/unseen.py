@@ -4,8 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from irb140_jax.mismatch.along import columns_along, prepared, seen_by
-from irb140_jax.mismatch.model import CorrectedModel, better_known, library_of, predict, torques_along
+from irb140_jax.mismatch.columns.along import columns_along, prepared, seen_by
+from irb140_jax.mismatch.columns.torques import better_known, library_of
+from irb140_jax.mismatch.corrected.model import CorrectedModel, predict, torques_along
 from irb140_jax.recordings.conceal import ConcealedCase, Noise
 from irb140_jax.recordings.condition import condition
 from irb140_jax.recordings.low_pass import filtered, kernels

@@ -8,8 +8,9 @@ import numpy as np
 
 from irb140_jax.effects import Scales
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.model import CorrectedModel, Named, to_json
-from irb140_jax.mismatch.undecided import Column, Pair, Undecided, save_undecided
+from irb140_jax.mismatch.columns.torques import Named
+from irb140_jax.mismatch.corrected.model import CorrectedModel, to_json
+from irb140_jax.mismatch.experiment_design.undecided import Column, Pair, Undecided, save_undecided
 from irb140_jax.recordings.low_pass import Band
 
 BAND = Band(torque=8.0, position=12.0, rate=100.0, step=2)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from irb140_jax.mismatch.bodies import of_bodies
-from irb140_jax.mismatch.consistent import LEAST, pseudo_inertia
-from irb140_jax.mismatch.prior import inertial_prior_factor
+from irb140_jax.mismatch.inertials.bodies import of_bodies
+from irb140_jax.mismatch.inertials.consistent import LEAST, pseudo_inertia
+from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.robot import Robot, irb140
 
 SPREAD = 0.3  # relative, of inertials that are hardly known

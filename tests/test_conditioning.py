@@ -12,7 +12,8 @@ from scipy import signal
 from irb140_jax import dynamics
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.model import CorrectedModel, Named, predict
+from irb140_jax.mismatch.columns.torques import Named
+from irb140_jax.mismatch.corrected.model import CorrectedModel, predict
 from irb140_jax.recordings.condition import choose_band, condition, conditioned
 from irb140_jax.recordings.direction import direction_of
 from irb140_jax.recordings.low_pass import Band, filtered, kernels

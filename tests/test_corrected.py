@@ -18,10 +18,11 @@ from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import corrected_robot, predict, prediction_times
-from irb140_jax.mismatch.consistent import consistent, pseudo_inertia
-from irb140_jax.mismatch.model import CorrectedModel, Named, from_json, scaled, to_json, torques_along
-from irb140_jax.mismatch.native import NOTES, XML, beyond_file, native_gap, native_robot, save_native
-from irb140_jax.mismatch.notes import gap_notes
+from irb140_jax.mismatch.columns.torques import Named, scaled
+from irb140_jax.mismatch.corrected.model import CorrectedModel, from_json, to_json, torques_along
+from irb140_jax.mismatch.corrected.native import NOTES, XML, beyond_file, native_gap, native_robot, save_native
+from irb140_jax.mismatch.inertials.consistent import consistent, pseudo_inertia
+from irb140_jax.mismatch.output.notes import gap_notes
 from irb140_jax.mismatch.regression.discrepancy import FEATURES, Discrepancy
 from irb140_jax.recordings import Recording, read_recording
 from irb140_jax.recordings.conceal import random_robot

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from irb140_jax import dynamics, effects
 from irb140_jax.effects import Motion, Scales
 from irb140_jax.effects.catalogue import CATALOGUE, _found
-from irb140_jax.mismatch.model import CorrectedModel, Named, predict
+from irb140_jax.mismatch.columns.torques import Named
+from irb140_jax.mismatch.corrected.model import CorrectedModel, predict
 from irb140_jax.recordings.concealed.catalogue import HIDDEN
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording

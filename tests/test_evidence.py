@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal, stats
 
-from irb140_jax.mismatch.evidence import eliminated, gain_of, grams, posterior
-from irb140_jax.mismatch.noise import ORDER, Noise, noise_from_residuals
-from irb140_jax.mismatch.rows import Stretch
+from irb140_jax.mismatch.regression.gaussian import eliminated, gain_of, grams, posterior
+from irb140_jax.mismatch.regression.noise import ORDER, Noise, noise_from_residuals
+from irb140_jax.mismatch.regression.rows import Stretch
 
 LAGS = 3  # coefficients of the whitening filter here, the row's own among them
 JOINTS, NUISANCES, AMPLITUDES = 2, 4, 5

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from irb140_jax.mismatch.evidence import eliminated, gain_of, posterior, root
+from irb140_jax.mismatch.regression.gaussian import eliminated, gain_of, posterior, root
 
 EXPONENTS = [0.0, 3.0, 6.0, 9.0]  # of ten, the sizes that columns differ by
 

@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 
 from irb140_jax import cli
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch import design, diagnose, load_undecided, propose, save
-from irb140_jax.mismatch.questions import Questions
-from irb140_jax.mismatch.testable import VISIBLE
-from irb140_jax.mismatch.undecided import Pair, save_undecided
+from irb140_jax.mismatch import diagnose, load_undecided, propose, save
+from irb140_jax.mismatch.experiment_design import design
+from irb140_jax.mismatch.experiment_design.questions import Questions
+from irb140_jax.mismatch.experiment_design.undecided import Pair, save_undecided
+from irb140_jax.mismatch.validation.testable import VISIBLE
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot, record_again
 from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import fourier_motion, motion_limits, slow_motion, within

@@ -9,9 +9,9 @@ from helpers_recordings import motion, recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.grids import Scales, nearest_in_each_direction
-from irb140_jax.mismatch import explain as loop
-from irb140_jax.mismatch.explain import explain
-from irb140_jax.mismatch.explanation import Explanation
+from irb140_jax.mismatch.selection import explain as loop
+from irb140_jax.mismatch.selection.explain import explain
+from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.recordings.condition import choose_band, conditioned
 from irb140_jax.recordings.recording import Recording
 

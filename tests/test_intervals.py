@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.intervals import _variance_about_shape, _variance_of
+from irb140_jax.mismatch.columns.candidates import Candidate
+from irb140_jax.mismatch.validation.intervals import _variance_about_shape, _variance_of
 
 ROWS = 80
 

@@ -26,6 +26,11 @@ LAYERS = (
     ("cli", "library"),
     ("__main__",),
 )
+# Inside mismatch/: the stages of a diagnosis, in their order.
+STAGES = (
+    "inertials", "columns", "regression", "selection", "corrected", "validation", "experiment_design", "motion",
+    "result", "output", "diagnose",
+)  # fmt: skip
 LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}
 
 
@@ -73,6 +78,40 @@ def test_every_module_imports_only_from_layers_above_its_own():
         module = path.relative_to(PACKAGE).with_suffix("").parts
         found += breaches(path.read_text(encoding="utf-8"), module)
     assert not found, "\n".join(found)
+
+
+def stage_breaches(source: str, stage: str) -> list[str]:
+    """Every module of mismatch/ that a stage imports and that is of a later stage or of none."""
+    wrong = []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("irb140_jax.mismatch"):
+            continue
+        below = (node.module or "").split(".")[2:3] or [alias.name for alias in node.names]
+        wrong += [name for name in below if name != stage
+                  and (name not in STAGES or STAGES.index(name) >= STAGES.index(stage))]  # fmt: skip
+    return wrong
+
+
+def test_every_stage_of_a_diagnosis_imports_only_from_earlier_ones():
+    folder = PACKAGE / "mismatch"
+    modules = [path for path in folder.rglob("*.py") if path != folder / "__init__.py"]
+    assert len(modules) > 30
+    for path in modules:
+        stage = path.relative_to(folder).with_suffix("").parts[0]
+        assert stage in STAGES, f"{stage} is no stage: give it a place in tests/test_layers.py"
+        assert not stage_breaches(path.read_text(encoding="utf-8"), stage), path
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from irb140_jax.mismatch.output.findings import findings",
+        "from irb140_jax.mismatch import diagnose",
+        "from irb140_jax.mismatch.somewhere_new import thing",
+    ],
+)
+def test_a_planted_import_from_a_later_stage_is_found(source):
+    assert stage_breaches(source, "selection")
 
 
 @pytest.mark.parametrize(

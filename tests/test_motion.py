@@ -10,13 +10,14 @@ import pytest
 from helpers_report import example_diagnosis, example_views
 from scipy.integrate import solve_ivp
 
-import irb140_jax.mismatch.store as store
+import irb140_jax.mismatch.output.store as store
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.model import CorrectedModel, Named
+from irb140_jax.mismatch.columns.torques import Named
+from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.corrected.native import beyond_file
 from irb140_jax.mismatch.motion import proof_in_motion
 from irb140_jax.mismatch.motion.sentences import lost, sentences
 from irb140_jax.mismatch.motion.windows import Span, spans, windows
-from irb140_jax.mismatch.native import beyond_file
 from irb140_jax.oracle.rollout import positions, simulated_model
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band

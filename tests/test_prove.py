@@ -6,11 +6,11 @@ from helpers_recordings import recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
-from irb140_jax.mismatch.explain import explain
-from irb140_jax.mismatch.explanation import Explanation
-from irb140_jax.mismatch.prove import folds, held_out, held_out_gains, refitted
+from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
+from irb140_jax.mismatch.selection.explain import explain
+from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.selected import noise_left
-from irb140_jax.mismatch.sensor_noise import scatter_by_sensor
+from irb140_jax.mismatch.validation.held_out import folds, held_out, held_out_gains, refitted
 from irb140_jax.recordings.condition import Conditioned, choose_band, condition
 from irb140_jax.recordings.low_pass import Band
 

@@ -6,7 +6,7 @@ import equinox as eqx
 import helpers_recordings as made
 import pytest
 
-from irb140_jax.mismatch.provenance import provenance
+from irb140_jax.mismatch.output.provenance import provenance
 from irb140_jax.recordings.recording import content_hash
 
 OPTIONS = {"inertial_uncertainty": 0.05}

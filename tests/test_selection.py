@@ -7,9 +7,9 @@ import pytest
 from scipy import integrate, signal, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.noise import correlation_time
+from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gram import LEVELS, ONE, SIZES, JointGram, log_prior, own_scale
+from irb140_jax.mismatch.regression.noise import correlation_time
 from irb140_jax.mismatch.selection.averages import probabilities
 from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Space
 from irb140_jax.mismatch.selection.kinds import Kinds

@@ -9,8 +9,9 @@ import pytest
 from helpers_cli import refused
 
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch import load_corrected, load_model, load_undecided, undecided
-from irb140_jax.mismatch.model import CorrectedModel
+from irb140_jax.mismatch import load_corrected, load_model, load_undecided
+from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.experiment_design import undecided
 from irb140_jax.mismatch.regression.discrepancy import FEATURES, Discrepancy
 
 

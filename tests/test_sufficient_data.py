@@ -12,7 +12,7 @@ from irb140_jax import cli
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.sufficient_data import comparable
+from irb140_jax.mismatch.regression.sufficient_data import comparable
 from irb140_jax.recordings import write_recording
 from irb140_jax.recordings.recording import Recording, rows_of
 

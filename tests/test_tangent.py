@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.along import columns_along, prepared, seen_by
-from irb140_jax.mismatch.model import CorrectedModel, Named, better_known, composed, library_of
-from irb140_jax.mismatch.rows import stretch
-from irb140_jax.mismatch.tangent import point
+from irb140_jax.mismatch.columns.along import columns_along, prepared, seen_by
+from irb140_jax.mismatch.columns.torques import Named, better_known, composed, library_of
+from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.regression.rows import stretch
+from irb140_jax.mismatch.regression.tangent import point
 from irb140_jax.recordings.condition import choose_band, condition
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import first_joints, irb140

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.prove import HeldOut
-from irb140_jax.mismatch.undecided_joints import undecidable
+from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.mismatch.validation.undecided_joints import undecidable
 from irb140_jax.recordings.low_pass import Band
 
 BAND = Band(20.0, 32.0, 200.0, 4)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.unknown import Rows, competitors, predicted
+from irb140_jax.mismatch.validation.unexplained import Rows, competitors, predicted
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import three_motions

@@ -110,7 +110,7 @@ def _read(folder: pathlib.Path) -> dict[str, Any]:
         InputError: It is none of this version.
     """
     from irb140_jax.mismatch.diagnose import SCHEMA
-    from irb140_jax.mismatch.intact import check_schema, refuse
+    from irb140_jax.mismatch.output.intact import check_schema, refuse
 
     path = folder / "diagnosis.json"
     try:

@@ -11,24 +11,18 @@ from threadpoolctl import threadpool_limits
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
-from irb140_jax.mismatch import locate
-from irb140_jax.mismatch.evidence import Posterior
-from irb140_jax.mismatch.explain import explain
-from irb140_jax.mismatch.explanation import Explanation, fitted
-from irb140_jax.mismatch.findings import findings, ranking, torque_scale_finding, torque_scale_odds
-from irb140_jax.mismatch.model import CorrectedModel, Named, scaled, torques_along
+from irb140_jax.mismatch.columns.torques import Named, scaled
+from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
+from irb140_jax.mismatch.corrected.native import beyond_file, native_gap
+from irb140_jax.mismatch.experiment_design.nothing_compared import all_open
+from irb140_jax.mismatch.experiment_design.undecided import undecided
 from irb140_jax.mismatch.motion import proof_in_motion
 from irb140_jax.mismatch.motion.windows import spans
-from irb140_jax.mismatch.native import beyond_file, native_gap
-from irb140_jax.mismatch.notes import discrepancy_notes, friction_notes, gap_notes, inertial_notes, notes
-from irb140_jax.mismatch.nothing_compared import all_open
-from irb140_jax.mismatch.prove import HeldOut, Refit, held_out, recordings_of_blocks, refitted
-from irb140_jax.mismatch.provenance import provenance
-from irb140_jax.mismatch.regression.discrepancy import Discrepancy
-from irb140_jax.mismatch.regression.nuisances import feature_coefficients
-from irb140_jax.mismatch.selection.selected import NAMED
-from irb140_jax.mismatch.sensor_noise import coarse_positions, scatter_by_sensor
-from irb140_jax.mismatch.servos import (
+from irb140_jax.mismatch.output import views
+from irb140_jax.mismatch.output.findings import findings, ranking, torque_scale_finding, torque_scale_odds
+from irb140_jax.mismatch.output.notes import discrepancy_notes, friction_notes, gap_notes, inertial_notes, notes
+from irb140_jax.mismatch.output.provenance import provenance
+from irb140_jax.mismatch.output.servos import (
     command_notes,
     harmful_discrepancy,
     harmful_notes,
@@ -36,12 +30,20 @@ from irb140_jax.mismatch.servos import (
     servo_sentence,
     without_negligible,
 )
-from irb140_jax.mismatch.sufficient_data import comparable, too_little, usable_rows
-from irb140_jax.mismatch.testable import Site, not_testable, reference, visibility
-from irb140_jax.mismatch.undecided import Undecided, undecided
-from irb140_jax.mismatch.undecided_joints import torque_size, undecidable
-from irb140_jax.mismatch.unknown import Unexplained, unexplained
-from irb140_jax.mismatch.words import inertial_views, summary, unexplained_entry, verdict
+from irb140_jax.mismatch.output.summary import inertial_views, summary, unexplained_entry, verdict
+from irb140_jax.mismatch.regression.discrepancy import Discrepancy
+from irb140_jax.mismatch.regression.gaussian import Posterior
+from irb140_jax.mismatch.regression.nuisances import feature_coefficients
+from irb140_jax.mismatch.regression.sensor_noise import coarse_positions, scatter_by_sensor
+from irb140_jax.mismatch.regression.sufficient_data import comparable, too_little, usable_rows
+from irb140_jax.mismatch.result import Result
+from irb140_jax.mismatch.selection.explain import explain
+from irb140_jax.mismatch.selection.explanation import Explanation, fitted
+from irb140_jax.mismatch.selection.selected import NAMED
+from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, recordings_of_blocks, refitted
+from irb140_jax.mismatch.validation.testable import Site, not_testable, reference, visibility
+from irb140_jax.mismatch.validation.undecided_joints import torque_size, undecidable
+from irb140_jax.mismatch.validation.unexplained import Unexplained, unexplained
 from irb140_jax.recordings.channels import with_lost_torque_marked
 from irb140_jax.recordings.check import MIN_SAMPLES, MOVING
 from irb140_jax.recordings.condition import Conditioned
@@ -77,23 +79,6 @@ class DiagnoseConfig:
         everything = {e.slug for e in self.effects} == set(CATALOGUE)
         effects = "all" if everything else [e.slug for e in self.effects]
         return {"inertial_uncertainty": self.inertial_uncertainty, "effects": effects}
-
-
-@dataclasses.dataclass(frozen=True)
-class Result:
-    """A diagnosis.
-
-    Attributes:
-        diagnosis: The contract's `diagnosis.json`.
-        model: The corrected model, for predictions.
-        views: Data for the report's figures.
-        undecided: What is open, for the design of a motion that decides it.
-    """
-
-    diagnosis: dict[str, Any]
-    model: CorrectedModel
-    views: dict[str, Any]
-    undecided: Undecided
 
 
 def diagnose(
@@ -308,10 +293,10 @@ def _views(
     return rounded({
         "joints": list(robot.joint_names),
         "recordings": names,
-        "maps": locate.maps(robot, ex, proof),
-        "motions": locate.motions(robot, ex, proof, names),
+        "maps": views.maps(robot, ex, proof),
+        "motions": views.motions(robot, ex, proof, names),
         "ranking": ranking(robot, ex),
-        "residual_spectrum": locate.spectra(robot, ex, proof),
+        "residual_spectrum": views.spectra(robot, ex, proof),
         "inertials": inertial_views(robot, ex),
         "notes": said,
     })  # fmt: skip

@@ -6,8 +6,8 @@ import numpy as np
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import Proposal, Undecided
-from irb140_jax.mismatch.testable import VISIBLE
-from irb140_jax.mismatch.undecided import Pair
+from irb140_jax.mismatch.experiment_design.undecided import Pair
+from irb140_jax.mismatch.validation.testable import VISIBLE
 from irb140_jax.robot import Robot
 
 SEPARATED = np.log(20.0)  # log odds at which one of two explanations has won

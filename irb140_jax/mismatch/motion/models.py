@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from irb140_jax.mismatch.consistent import of_bodies_or_nominal
-from irb140_jax.mismatch.model import CorrectedModel
-from irb140_jax.mismatch.native import native_robot
+from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.corrected.native import native_robot
+from irb140_jax.mismatch.inertials.consistent import of_bodies_or_nominal
 from irb140_jax.oracle.mujoco import mass_matrix
 from irb140_jax.oracle.rollout import simulated_model
 from irb140_jax.recordings.condition import Conditioned

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from irb140_jax.mismatch.model import CorrectedModel
+from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.motion.models import FILE, Simulated, compiled_robot, leading, led, simulated
 from irb140_jax.mismatch.motion.sentences import MODELS, sentences, subject
 from irb140_jax.mismatch.motion.windows import FINEST, LONGEST, Span, Window, windows

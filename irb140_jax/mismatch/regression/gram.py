@@ -14,8 +14,8 @@ from functools import partial
 import numpy as np
 from scipy import linalg
 
-from irb140_jax.mismatch.assemble import Data
-from irb140_jax.mismatch.noise import Noise, correlation_time
+from irb140_jax.mismatch.regression.assemble import Data
+from irb140_jax.mismatch.regression.noise import Noise, correlation_time
 from irb140_jax.mismatch.regression.nuisances import SCALED, Nuisances
 
 SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)  # of a block, as a share of the joint's torque

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.effects import Scales
-from irb140_jax.mismatch.along import Prepared
+from irb140_jax.mismatch.columns.along import Prepared
 from irb140_jax.mismatch.regression.discrepancy import features
 from irb140_jax.mismatch.regression.servo import scale_width, servo_columns
 from irb140_jax.recordings.low_pass import Band

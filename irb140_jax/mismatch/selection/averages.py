@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.columns.candidates import Candidate
 
 WITHIN = 15.0  # nats of the best set: others weigh less than one in a million
 

@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg, special
 
-from irb140_jax.mismatch.beside import Beside
-from irb140_jax.mismatch.candidates import Candidate
-from irb140_jax.mismatch.evidence import posterior, root, with_prior
+from irb140_jax.mismatch.columns.beside import Beside
+from irb140_jax.mismatch.columns.candidates import Candidate
+from irb140_jax.mismatch.regression.gaussian import posterior, root, with_prior
 from irb140_jax.mismatch.regression.gram import LEVELS, SIZES, JointGram, Setting
 from irb140_jax.mismatch.selection.kinds import Kinds
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
-from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.columns.candidates import Candidate
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from irb140_jax.mismatch.candidates import Candidate
+from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gram import SIZES
 from irb140_jax.mismatch.selection.evidence import Settings, Space
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from irb140_jax.mismatch.assemble import Data
-from irb140_jax.mismatch.noise import Noise, noise_from_residuals, ridge
+from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gram import SIZES, START, own_scale
+from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals, ridge
 from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, in_its_place
 from irb140_jax.mismatch.selection.evidence import Settings, Space

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from irb140_jax.mismatch.assemble import Data
-from irb140_jax.mismatch.candidates import Candidate, Library
-from irb140_jax.mismatch.noise import Noise
+from irb140_jax.mismatch.columns.candidates import Candidate, Library
+from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gram import joint_grams
+from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.selection.evidence import Space
 from irb140_jax.mismatch.selection.kinds import kinds_of

@@ -1,0 +1,1 @@
+"""What each candidate explanation adds to the torque along a recording, and how a model's torque is summed from it."""

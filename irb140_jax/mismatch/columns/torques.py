@@ -1,0 +1,153 @@
+"""A model's torque along a motion, summed from the rigid body's and from those of named effects."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.columns.along import Columns, Loads
+from irb140_jax.mismatch.columns.candidates import Candidate, Library
+from irb140_jax.mismatch.inertials.consistent import consistent
+from irb140_jax.robot import Robot, with_phi
+
+
+@dataclasses.dataclass(frozen=True)
+class Named:
+    """A named effect with its numbers.
+
+    Attributes:
+        effect: The effect.
+        joints: Indices of its joints.
+        variant: Columns it uses.
+        amplitudes: One per column used.
+        shape: Shape parameters.
+    """
+
+    effect: AbstractEffect
+    joints: tuple[int, ...]
+    variant: tuple[int, ...]
+    amplitudes: np.ndarray
+    shape: np.ndarray
+
+    def all_amplitudes(self) -> np.ndarray:
+        """Amplitudes of every column of the effect, zero for those it doesn't use."""
+        full = np.zeros(max(max(v) for v in self.effect.variants) + 1)
+        full[list(self.variant)] = self.amplitudes
+        return full
+
+
+def scaled(n: int, named: Sequence[Named], scale: float) -> tuple[Named, ...]:
+    """The effects where one scale of all torques is off: a torque gain on every joint.
+
+    Friction was found in the torque that is logged; the model holds the real one, which the gain turns into it.
+
+    Args:
+        n: Number of joints.
+        named: The effects.
+        scale: Logged over real torque, less one.
+    """
+    if not scale:
+        return tuple(named)
+    gain, out = CATALOGUE["torque_gain"], []
+    for one in named:
+        if one.effect.friction:
+            out.append(dataclasses.replace(one, amplitudes=one.amplitudes / (1.0 + scale)))
+        elif one.effect is not gain:
+            out.append(one)
+    own = {m.joints[0]: m.amplitudes[0] for m in named if m.effect is gain}
+    every = (np.array([scale + own.get(j, 0.0)]) for j in range(n))
+    return (*out, *(Named(gain, (j,), (0,), w, np.zeros(0)) for j, w in enumerate(every)))
+
+
+def as_named(robot: Robot, named: Sequence[Named]) -> Robot:
+    """The robot with as much of the effects in its own numbers as those can hold."""
+    for n in named:
+        robot = n.effect.in_model(robot, n.joints, n.all_amplitudes(), n.shape)
+    return robot
+
+
+def better_known(robot: Robot, phi: np.ndarray, named: Sequence[Named]) -> Robot:
+    """The robot whose slopes over position and speed shape the effects: refitted inertials, and the springs named.
+
+    The load that effects see holds those springs; without them in the slopes, play would be taken out of a link that
+    is softer or stiffer than its load says.  Links are possible bodies: what swings on a spring has a mass.
+
+    Args:
+        robot: The nominal model.
+        phi: Inertial parameters, shape (n, 10).
+        named: The effects.
+    """
+    sprung = as_named(robot, named)
+    springs = lambda r: (r.stiffness, r.springref)  # noqa: E731
+    possible = consistent(phi, np.asarray(robot.phi))
+    return eqx.tree_at(springs, with_phi(robot, jnp.asarray(possible)), springs(sprung))
+
+
+@dataclasses.dataclass(frozen=True)
+class Torques:
+    """Torques along a motion, each (T, n) [N m or N].
+
+    Attributes:
+        nominal: Of the model as given.
+        refit: Of the rigid body with refitted inertials.
+        loads: Of the corrected model: transmissions carry the corrected rigid body and all effects, but for friction
+            and what only the log shows.
+        corrected: What the controller logs: total, by its torque constants, when and as it was asked for.
+    """
+
+    nominal: np.ndarray
+    refit: np.ndarray
+    loads: Loads
+    corrected: np.ndarray
+
+
+def composed(
+    lib: Library,
+    along: Columns,
+    candidates: Sequence[Candidate],
+    amplitudes: Sequence[np.ndarray],
+    dphi_refit: np.ndarray,
+    dphi_corrected: np.ndarray,
+) -> Torques:
+    """Add up a model's torques along a recording.
+
+    Args:
+        lib: The library of the candidates.
+        along: Regressor, nominal torque and columns.
+        candidates: The effects.
+        amplitudes: Amplitudes of each.
+        dphi_refit, dphi_corrected: Shift of the inertial parameters in either model, shape (10 n,).
+    """
+    Y, nominal, inside, columns = along
+    load = nominal + Y @ dphi_corrected
+    friction, logged = np.zeros_like(load), np.zeros((2, *load.shape))
+    for c, w in zip(candidates, amplitudes, strict=True):
+        part = lib.torque(columns, c.columns, w)
+        if c.effect.logged:
+            logged[c.effect.logged - 1] += part
+        elif c.effect.friction:
+            friction += part
+        else:
+            load = load + part
+            inside = inside + part if c.effect.transmission else inside
+    total = load + friction
+    scaled, corrected = total + np.cumsum(logged, axis=0)
+    return Torques(nominal, nominal + Y @ dphi_refit, Loads(load, total, load - inside, scaled), corrected)
+
+
+def library_of(robot: Robot, effects: Sequence[Named]) -> Library:
+    """A library of nothing but these effects, in their order."""
+    blocks, candidates, first = [], [], 0
+    for named in effects:
+        width = max(max(v) for v in named.effect.variants) + 1
+        blocks.append((named.effect, np.array([named.joints]), named.shape[None, None, :], first))
+        candidates.append(
+            Candidate(named.effect, named.joints, named.shape, first + np.array(named.variant), named.variant,
+                      np.full(len(named.variant), -np.inf), np.full(len(named.variant), np.inf))
+        )  # fmt: skip
+        first += width
+    return Library(robot, tuple(candidates), tuple(blocks), first)

@@ -1,0 +1,1 @@
+"""The corrected model: what predicts, as a JAX pytree and as MJCF."""

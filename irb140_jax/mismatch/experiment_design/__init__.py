@@ -1,0 +1,1 @@
+"""What a diagnosis leaves open, and the motion that would decide it."""

@@ -1,0 +1,1 @@
+"""What people and other programs read: findings, verdict, notes, views, and files."""

@@ -1,0 +1,127 @@
+"""What a person should know beside the verdict: repairs, assumptions, warnings, joints that were not judged."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from irb140_jax.mismatch.regression.nuisances import SCALED
+from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.selection.space import RARE
+from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.low_pass import Band
+from irb140_jax.robot import Robot
+
+FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
+NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
+
+
+def notes(
+    robot: Robot, smooth: Sequence[Conditioned], band: Band, uncertainty: float, rows: np.ndarray, judged: np.ndarray
+) -> list[str]:
+    """The contract's `notes`, a sentence each.
+
+    Args:
+        robot: The nominal model, whose reader has notes of its own.
+        smooth: The conditioned recordings with theirs.
+        band: Of the comparison.
+        uncertainty: Relative standard deviation of the inertials.
+        rows: Rows in which each joint moves, shape (n,).
+        judged: Joints of which enough rows tell, shape (n,).
+    """
+    out = [f"Model {robot.name}: {_sentence(note)}" for note in robot.notes]
+    out += [f"{r.source}: {_sentence(note)}" for r in smooth for note in r.notes]
+    for name, count, enough in zip(robot.joint_names, rows, judged, strict=True):
+        if not enough:
+            out.append(f"{name} is not judged: it moves in only {count} usable rows; record motion of this joint.")
+    out.append(
+        f"The model's inertial parameters are assumed to be right to {100 * uncertainty:.3g} %, one standard deviation "
+        "(--inertial-uncertainty)."
+    )
+    if not judged.any():
+        return list(dict.fromkeys(out))
+    out.append(
+        f"Model and recordings are compared below {band.torque:.3g} Hz; positions were smoothed with a bandwidth of "
+        f"{band.position:.3g} Hz and differentiated. All figures of a joint leave out the rows in which it rests, "
+        "because dry friction is undetermined there."
+    )
+    return list(dict.fromkeys(out))
+
+
+def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
+    """A note where the inertials look wrong by clearly more than was stated."""
+    width = ex.space.width(ex.chosen, ex.settings)
+    if width <= 1.0:
+        return []
+    return [
+        f"The recordings suit inertial parameters that are wrong by about {100 * width * uncertainty:.0f} % better "
+        f"than the {100 * uncertainty:.3g} % that were stated; the diagnosis allows for it."
+    ]
+
+
+def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out: Sequence[str]) -> list[str]:
+    """A note for every joint at which `corrected.xml` gives another torque than the corrected model.
+
+    Args:
+        robot: The nominal model.
+        gap: The difference, shape (n,), or None where it isn't known.
+        torque: Size of the joints' torque, shape (n,).
+        left_out: Effects that MJCF can't hold, or not whole.
+    """
+    if gap is None:
+        return ["corrected.xml could not be compared with the corrected model: MuJoCo reads other joints from it."]
+    reason = f"the file can't hold all of {', '.join(left_out)}" if left_out else (
+        "a link of the given model has inertial parameters that no body can have, and the file keeps them")
+    return [
+        f"On {name} the torque of corrected.xml differs from that of the corrected model by {g:.3g} "
+        f"{'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of the joint's torque): {reason}. To predict torque, use "
+        "`irb140 predict`."
+        for name, slide, g, t in zip(robot.joint_names, robot.is_slide, gap, torque, strict=True)
+        if g > NOTABLE_GAP * t > 0.0
+    ]
+
+
+def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
+    """A note for every joint whose friction differs from recording to recording.
+
+    Said where friction of its own for each recording is more probable than one for all, against the odds of any rare
+    effect.
+
+    Args:
+        ex: The explanation.
+        names: Of the recordings.
+    """
+    out = []
+    _, _, own = ex.prediction()
+    for j, setting in enumerate(ex.settings):
+        one_level = (*setting[:FRICTION_LEVELS], 0, *setting[FRICTION_LEVELS + 1 :])
+        alike = (*ex.settings[:j], one_level, *ex.settings[j + 1 :])
+        gain = ex.space.log_evidence(ex.chosen, ex.settings) - ex.space.log_evidence(ex.chosen, alike)
+        levels = ex.extra[0].groups[j] == FRICTION_LEVELS
+        if levels.any() and gain > -np.log(RARE):
+            units = ("N", "N s/m") if ex.lib.robot.is_slide[j] else ("N m", "N m s/rad")
+            dry, fast = (own[j] * ex.extra[0].units[j])[levels].reshape(2, -1)
+            said = ", ".join(
+                f"{d:+.3g} {units[0]} dry and {v / ex.scales.speed[j]:+.3g} {units[1]} viscous in {name}"
+                for d, v, name in zip(dry, fast, names, strict=True)
+            )
+            joint = ex.lib.robot.joint_names[j]
+            out.append(f"The friction of {joint} differs between the recordings; relative to their mean: {said}.")
+    return out
+
+
+def discrepancy_notes(robot: Robot, proof: HeldOut) -> list[str]:
+    """A note where the corrected model holds torque that no effect explains."""
+    joints = [name for name, carried in zip(robot.joint_names, proof.carried, strict=True) if carried]
+    if not joints:
+        return []
+    return [
+        f"On {', '.join(joints)} the corrected model adds torque that no effect explains, as a function of the joint's "
+        "own motion, because this lowers the error on unseen motions. `irb140 predict` includes it; corrected.xml and "
+        "load_corrected do not."
+    ]
+
+
+def _sentence(note: str) -> str:
+    note = note.strip()
+    return note if note.endswith((".", "!", "?")) else f"{note}."

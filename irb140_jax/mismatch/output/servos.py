@@ -1,0 +1,154 @@
+"""What a diagnosis of servo logs says beside its findings: which errors of the drive look like a finding."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
+from irb140_jax.mismatch.regression.nuisances import FIXED
+from irb140_jax.mismatch.regression.servo import NAMES
+from irb140_jax.mismatch.selection.explanation import Explanation, parts
+from irb140_jax.mismatch.selection.space import RARE
+from irb140_jax.recordings.condition import INEXACT, Commanded, Conditioned
+from irb140_jax.recordings.recording import Recording
+from irb140_jax.robot import Robot
+
+COMMAND_DELAY = len(FIXED) + NAMES.index("command")
+DRIVE_KD = len(FIXED) + NAMES.index("kd")
+NOTABLE_DELAY = 1e-3  # s, of commands, from which it is worth a note
+LAGS = ("actuator_lag", "time_delay", "channel_skew")  # effects that a late command can't be told from
+
+
+def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
+    """The explanation without effects that are smaller at every joint than the error of a servo law."""
+    if servo is None:
+        return ex
+    post = ex.posterior()
+    w = post.mean * ex.data.scale[post.columns]
+    logged = _rms([s.tau for s in ex.data.stretches], ex)
+    kept = []
+    for index, rows in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
+        c = ex.data.candidates[index]
+        torque = [s.X[..., ex.data.nuisances + c.columns] @ w[rows] for s in ex.data.stretches]
+        if c.slug == "inertials" or np.any(_rms(torque, ex) > INEXACT * logged):
+            kept.append(index)
+    return dataclasses.replace(ex, chosen=tuple(kept))
+
+
+def harmful_discrepancy(
+    model: CorrectedModel, smooth: Sequence[Conditioned], without: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Joints on which the model's torque is worse with its discrepancy than without, shape (n,).
+
+    The fit may see another load than the model has: an error of the drive moves the inertials, and what bends with the
+    load is then scaled wrongly.
+
+    Args:
+        model: The corrected model.
+        smooth: The recordings that it was found in.
+        without: Torque of the same model without discrepancy along them, low-passed, (R, n) each.
+    """
+    band, squares = model.band, np.zeros((2, model.robot.n))
+    for r, plain in zip(smooth, without, strict=True):
+        rows = band.kept(len(r.t))
+        tau, both = band.apply(r.tau), (plain, band.apply(torques_along(model, r).corrected))
+        squares += [np.sum(np.where(r.usable[rows], tau - x, 0.0) ** 2, axis=0) for x in both]
+    return squares[1] > squares[0]
+
+
+def harmful_notes(robot: Robot, harmful: np.ndarray) -> list[str]:
+    """A note where a joint's discrepancy is left out, see `harmful_discrepancy`."""
+    if not harmful.any():
+        return []
+    names = ", ".join(name for name, bad in zip(robot.joint_names, harmful, strict=True) if bad)
+    return [
+        f"On {names} `irb140 predict` adds no torque that no effect explains: with the loads of the corrected model it "
+        "would make the error larger."
+    ]
+
+
+def _rms(torque: Sequence[np.ndarray], ex: Explanation) -> np.ndarray:
+    """Root mean square over the rows in which each joint counts, shape (n,)."""
+    use = [s.use for s in ex.data.stretches]
+    rows = np.maximum(sum(u.sum(axis=0) for u in use), 1)
+    return np.sqrt(sum(np.sum(np.where(u, x, 0.0) ** 2, axis=0) for x, u in zip(torque, use, strict=True)) / rows)
+
+
+def of_servos(ex: Explanation, servo: Commanded | None, found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Findings of servo logs, each with the errors of the drive's gains or clock that would look the same."""
+    if servo is None:
+        return found
+    out, names = [], list(ex.lib.robot.joint_names)
+    for f in found:
+        said = ""
+        if f["effect"] == "viscous_friction":
+            j = names.index(f["joints"][0])
+            off = float(servo.drive.kd_width[j] * _joint_nuisances(ex, j)[0][DRIVE_KD])
+            both = f["parameters"]["viscous"]["value"] + float(servo.drive.kd[j]) + off
+            said = (
+                f" It can't be told from the drive's Kd, which is taken as {servo.drive.kd[j]:.3g}: only the sum of "
+                f"both, {both:.3g}, is known; recordings with two different Kd, or of unpowered motion, would tell "
+                "them apart."
+            )
+        elif f["effect"] == "torque_gain":
+            said = " On a servo this means that the stated Kp is wrong, or that the masses of the model are."
+        elif f["effect"] in LAGS:
+            said = (
+                " The fit can't tell its cause: the drive may apply commands late, its torque may lag, or the clocks "
+                "may be out of step."
+            )
+        elif f["effect"] == "rotor_inertia":
+            said = (
+                " This number depends on how late the drive applies its commands, because a delay shifts the torque's "
+                "phase."
+            )
+        out.append(f | {"certain": f["certain"] + said})
+    return out
+
+
+def command_notes(ex: Explanation, servo: Commanded | None) -> list[str]:
+    """A note for every servo that applies its commands late, or whose torque lags as much.
+
+    Its odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
+    any rare effect.
+    """
+    if servo is None:
+        return []
+    out = []
+    for j in range(ex.lib.robot.n):
+        own, spread = (x[COMMAND_DELAY] for x in _joint_nuisances(ex, j))
+        odds = stats.norm.logpdf(0.0) - stats.norm.logpdf(0.0, own, spread) + np.log(RARE)
+        if odds > 0.0 and abs(servo.delay_width * own) > NOTABLE_DELAY:
+            late, width = 1e3 * servo.delay_width * own, 1e3 * servo.delay_width * spread
+            way = "late" if own > 0 else "early"
+            out.append(
+                f"Commands of {ex.lib.robot.joint_names[j]} act {abs(late):.2g} +- {width:.1g} ms {way}; the fit takes "
+                "this into account. It can't tell whether the drive applies its commands late, its torque lags, or the "
+                "clocks are out of step."
+            )
+    return out
+
+
+def _joint_nuisances(ex: Explanation, j: int) -> tuple[np.ndarray, np.ndarray]:
+    """A joint's nuisance parameters and their standard deviations, both in prior standard deviations."""
+    mean, _ = ex.space.posterior(ex.chosen, ex.settings)
+    columns, setting = ex.space.set_columns(ex.chosen), ex.settings[j]
+    own = ex.space.own(j, setting, columns, mean, instrument=True)
+    return own, ex.space.joints[j].at(setting).spread()
+
+
+def servo_sentence(recordings: Sequence[Recording]) -> str:
+    """A sentence for the summary; empty where torque was logged."""
+    drives = [r.drive for r in recordings if r.is_servo_log and r.drive is not None]
+    if not drives:
+        return ""
+    guessed = [name for name, said in zip(recordings[0].joint_names, drives[0].said, strict=True) if said == "estimate"]
+    unit = f" On {', '.join(guessed)} Kp is estimated, so torques are in units of that Kp." if guessed else ""
+    return (
+        f" No torque was logged; it was computed by the law of the servos, Kp (qdes - q) - Kd qd.{unit} Effects found "
+        "in such logs are less certain than their probabilities say: on real servos several of them were wrong "
+        "(docs/real-machines.md)."
+    )

@@ -1,0 +1,63 @@
+"""Which recordings are long enough to be compared with the model, and whether any joint moves enough in them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from irb140_jax.mismatch.regression.assemble import FEWEST_ROWS as FEWEST_OF_A_JOINT
+from irb140_jax.recordings.condition import Conditioned, choose_band, conditioned
+from irb140_jax.recordings.low_pass import Band
+from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.repeats import with_motions_numbered
+from irb140_jax.robot import Robot
+
+FEWEST_ROWS = 80  # low-passed rows of all recordings together, below which nothing can be said
+FEWEST_OF_ONE = 16  # of one recording: fewer have no blocks to leave out, and no noise to measure
+
+
+def comparable(
+    robot: Robot, recordings: Sequence[Recording]
+) -> tuple[Band, list[Recording], list[Conditioned], list[str]]:
+    """The recordings that are long enough to be compared, or all of them where none is.
+
+    Args:
+        robot: The nominal model.
+        recordings: At least one.
+
+    Returns:
+        The band of the comparison, the recordings, the same conditioned, and a note for each recording that is left
+        out or that repeats another one.
+    """
+    left_out: list[str] = []
+    while True:
+        band = choose_band(list(recordings), robot)
+        smooth, again = with_motions_numbered(conditioned(recordings, band), recordings)
+        rows = [len(band.kept(len(r.t))) for r in smooth]
+        short = [k for k, count in enumerate(rows) if count < FEWEST_OF_ONE]
+        if not short or len(short) == len(rows):
+            return band, list(recordings), smooth, left_out + again
+        left_out += [f"{smooth[k].source} is left out: {rows[k]} samples below {band.torque:.3g} Hz remain of it, and "
+                     f"{FEWEST_OF_ONE} are needed." for k in short]  # fmt: skip
+        recordings = [r for k, r in enumerate(recordings) if k not in short]
+
+
+def usable_rows(smooth: Sequence[Conditioned], band: Band) -> np.ndarray:
+    """Low-passed rows in which each joint moves and nothing is lost, over all recordings, shape (n,)."""
+    return np.sum([r.usable[band.kept(len(r.t))].sum(axis=0) for r in smooth], axis=0)
+
+
+def too_little(smooth: Sequence[Conditioned], band: Band) -> str:
+    """Why no joint at all can be compared, and what to record; empty where one can."""
+    rows = sum(len(band.kept(len(r.t))) for r in smooth)
+    if rows < FEWEST_ROWS:
+        return (
+            f"Only {rows} samples below {band.torque:.3g} Hz can be compared with the model, and {FEWEST_ROWS} are "
+            "needed: record at least 15 s in which every joint moves, with a dozen reversals"
+        )
+    most = int(usable_rows(smooth, band).max())
+    if most < FEWEST_OF_A_JOINT:
+        return (
+            f"No joint moves for long enough: at most {most} samples of one can be compared with the model, and "
+            f"{FEWEST_OF_A_JOINT} are needed: record at least 15 s in which every joint moves, with a dozen reversals"
+        )
+    return ""

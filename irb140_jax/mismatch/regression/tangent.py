@@ -1,0 +1,102 @@
+"""Where the regression is linearised: what was found of gravity and of the log multiplies all other unknowns.
+
+Two products of unknowns are too large to be left to the next round.  Gravity that leans shows the centres of mass of
+links behind a vertical axis, which upright gravity does not: without it, what a wrong centre of mass does there has to
+be a spring.  And a lag or a delay of the log is one of every torque in it: a law that changes within milliseconds shows
+mostly in its own rate.  Both are as in Gauss and Newton's method: columns are slopes at the last explanation, and what
+the products count twice is taken off.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax import dynamics
+from irb140_jax.mismatch.columns.along import Loads
+from irb140_jax.mismatch.columns.torques import Named, as_named
+from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.robot import Robot
+
+AT_ONCE = 256  # columns whose rates are held at a time
+
+
+class Point(NamedTuple):
+    """What an explanation says of gravity, inertials and the log.
+
+    Attributes:
+        leaning: The nominal robot under the gravity found, or None where that is the model's own.
+        dphi: Shift of the inertials, shape (10 n,).
+        log: Laws of the log, in the order in which they act.
+        rests_on: Effects that it is made of, (slug, joints): of an explanation without them its slopes say nothing.
+    """
+
+    leaning: Robot | None
+    dphi: np.ndarray
+    log: tuple[Named, ...]
+    rests_on: frozenset[tuple[str, tuple[int, ...]]]
+
+    @property
+    def plain(self) -> bool:
+        """Whether the columns are what they are without it."""
+        return self.leaning is None and not self.log
+
+
+def point(robot: Robot, dphi: np.ndarray, named: Sequence[Named]) -> Point:
+    """The point of an explanation.
+
+    Args:
+        robot: The nominal model.
+        dphi: Shift of the inertials, shape (10 n,).
+        named: The effects.
+    """
+    lean = [n for n in named if not np.array_equal(as_named(robot, [n]).gravity, robot.gravity)]
+    leaning = eqx.tree_at(lambda r: r.gravity, robot, as_named(robot, lean).gravity) if lean else None
+    log = sorted((n for n in named if n.effect.logged), key=lambda n: n.effect.logged)
+    return Point(leaning, dphi, tuple(log), frozenset((n.effect.slug, n.joints) for n in (*lean, *log)))
+
+
+def regressor(at: Point, recording: Conditioned, upright: np.ndarray) -> np.ndarray:
+    """Rigid-body regressor under the gravity found, shape (T, n, 10 n); `upright` is that of the model."""
+    if at.leaning is None:
+        return upright
+    moving = (jnp.asarray(x) for x in (recording.q, recording.qd, recording.qdd))
+    return np.asarray(dynamics.regressor_batch(at.leaning, *moving))
+
+
+def logged(at: Point, x: np.ndarray, joints: np.ndarray, dt: float) -> np.ndarray:
+    """What the log shows of torques, a copy where that is not the torques themselves.
+
+    Args:
+        at: The point.
+        x: Torques, shape (T, any).
+        joints: The joint of each, negative for what is in the log already, shape (any,).
+        dt: Between samples [s].
+    """
+    for law in at.log:
+        at_law = np.flatnonzero((joints >= 0) & (np.isin(joints, law.joints) | law.effect.everywhere))
+        if not len(at_law):
+            continue
+        x = x.copy()
+        for some in np.array_split(at_law, len(at_law) // AT_ONCE + 1):
+            x[:, some] += law.effect.passed_on(x[:, some], dt, law.all_amplitudes(), law.shape)
+    return x
+
+
+def counted_twice(at: Point, loads: Loads, dt: float) -> np.ndarray:
+    """What laws of the log make of the explanation's torques: it is in their own columns and in all others', (T, n).
+
+    Args:
+        at: The point.
+        loads: Of the explanation.
+        dt: Between samples [s].
+    """
+    sources = loads.total, loads.scaled
+    out, every = np.zeros_like(loads.total), np.arange(loads.total.shape[1])
+    for law in at.log:
+        on = every if law.effect.everywhere else np.array(law.joints)
+        source = sources[law.effect.logged - 1]
+        out[:, on] += law.effect.passed_on(source[:, on], dt, law.all_amplitudes(), law.shape)
+    return out

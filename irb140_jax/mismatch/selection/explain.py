@@ -1,0 +1,198 @@
+"""The loop at the heart of a diagnosis: columns, noise, search, and again with finer shapes and the corrected load."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from irb140_jax.effects import AbstractEffect
+from irb140_jax.mismatch.columns.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
+from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, reshaped
+from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, composed, library_of
+from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
+from irb140_jax.mismatch.regression.assemble import BLOCKS, assemble
+from irb140_jax.mismatch.regression.noise import Noise
+from irb140_jax.mismatch.regression.nuisances import nuisances
+from irb140_jax.mismatch.regression.rows import stretch
+from irb140_jax.mismatch.regression.scout import left_over, scouted, suggested
+from irb140_jax.mismatch.regression.tangent import Point, point
+from irb140_jax.mismatch.selection.explanation import Explanation, fitted, parts
+from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
+from irb140_jax.mismatch.selection.space import space_of
+from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.low_pass import Band
+from irb140_jax.robot import Robot
+
+PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both ...
+MOST_PASSES = 8  # ... unless shapes become finer and finer:
+SETTLED = 0.1  # relative change of the noise from round to round
+
+
+def explain(
+    robot: Robot,
+    recordings: Sequence[Conditioned],
+    band: Band,
+    effects: Sequence[AbstractEffect],
+    uncertainty: float,
+    sensors: np.ndarray,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Explanation:
+    """Search for what the model leaves out.
+
+    Args:
+        robot: The nominal model.
+        recordings: Conditioned, at least one.
+        band: Of the comparison.
+        effects: The library.
+        uncertainty: Relative standard deviation of the inertials.
+        sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
+        progress: Told what is being done.
+    """
+    factor = inertial_prior_factor(robot, 1.0)
+    progress("rigid body along the recordings")
+    along = [prepared(robot, r) for r in recordings]
+    scales = scales_of(along)
+    lib = first = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
+    loads: list[Loads | None] = [None] * len(recordings)
+    at: Point | None = None
+    chosen: tuple[int, ...] = ()
+    noise: Noise | None = None
+
+    def explained(turn: int, blocks: int) -> Explanation:
+        ex = explained_at(at, turn, blocks)
+        if at and not at.rests_on <= {(m.slug, m.joints) for m in ex.members}:
+            # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
+            del ex
+            return explained_at(None, turn, blocks)
+        return ex
+
+    def explained_at(at: Point | None, turn: int, blocks: int) -> Explanation:
+        progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
+        both = zip(along, loads, strict=True)
+        rows = [stretch(lib, r, i, band, factor, load, at) for i, (r, load) in enumerate(both)]
+        if at and not all(np.isfinite(r.y).all() and np.isfinite(r.X).all() for r in rows):
+            return explained_at(None, turn, blocks)  # an explanation without bounds is nothing to start from
+        data = assemble(lib, rows, uncertainty)
+        progress(f"searching sets of explanations (round {turn})")
+        known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in zip(along, loads, strict=True)]
+        extra = nuisances(robot, along, known, band, scales)
+        whitening = noise or flexible_noise(data, extra)
+        space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1)
+        # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
+        best, settings, sets = selected(space, chosen, every_move=turn == 1 or blocks > 1)
+        return Explanation(lib, scales, data, extra, whitening, space, best, settings, sets, factor)
+
+    turn, coarse, off = 1, False, False
+    while turn < PASSES or ((coarse or off) and turn < MOST_PASSES):
+        ex = explained(turn, blocks=1)
+        found = fitted(ex.data, ex.posterior(), ex.chosen, factor)
+        physics = _physics(found)
+        better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
+        along, at = [seen_by(better, r) for r in along], point(robot, found[0], physics)
+        torques = [_torques(robot, physics, found[0], r, i) for i, r in enumerate(along)]
+        loads = [t.loads for t in torques]
+        off = _off(ex, torques, band)
+        noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
+        coarse = _coarse(ex, noise)
+        # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
+        lib, chosen = _refined(_without_discrepancy(ex) if turn == 1 or coarse else ex)
+        turn += 1
+        del ex  # hundreds of megabytes, before the next
+    ex = explained(turn, BLOCKS)
+    sure, settings = named(ex.space, ex.chosen, ex.settings, ex.sets)
+    return dataclasses.replace(ex, chosen=sure, settings=settings)
+
+
+def _physics(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
+    """The effects of an explanation (see `fitted`) with their numbers."""
+    _, members, amplitudes = found
+    return [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
+
+
+def _torques(robot: Robot, physics: Sequence[Named], dphi: np.ndarray, r: Prepared, index: int) -> Torques:
+    """Torques of effects and of shifted inertial parameters (10 n,) along a recording."""
+    lib = library_of(robot, physics)
+    columns = columns_along(lib, r, recording=index)
+    return composed(lib, columns, lib.candidates, [named.amplitudes for named in physics], dphi, dphi)
+
+
+def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
+    """Whether an explanation is another than its linearisation by more than noise at some joint: it has to be repeated.
+
+    Args:
+        ex: The explanation, linear in what is unknown.
+        torques: What its numbers give along the recordings, products of unknowns included.
+        band: Of the comparison.
+    """
+    post = ex.posterior()
+    w = post.mean * ex.data.scale[post.columns]
+    square = np.zeros(len(ex.settings))
+    for s, t in zip(ex.data.stretches, torques, strict=True):
+        linear = s.tau - s.y + s.X[..., post.columns] @ w
+        square += np.sum(np.where(s.use, band.apply(t.corrected) - linear, 0.0) ** 2, axis=0)
+    rows = np.maximum(sum(s.use.sum(axis=0) for s in ex.data.stretches), 1)
+    return bool(np.any(np.sqrt(square / rows) > ex.level))
+
+
+def _without_discrepancy(ex: Explanation) -> Explanation:
+    """The explanation as if its laws were exact."""
+    return dataclasses.replace(ex, settings=tuple((*(0 for _ in s[:-1]), s[-1]) for s in ex.settings))
+
+
+def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
+    """Finer grids of shapes around the best ones, grids that the residual suggests, the set with the best shapes."""
+    left = left_over(ex.data, ex.columns(), ex.noise.total)
+    shapes, best = [], {i: ex.data.candidates[i].shape for i in ex.chosen}
+    post = ex.posterior()
+    w = post.mean * ex.data.scale[post.columns]
+    amplitudes = {i: w[part] for i, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True)}
+    for effect, sites, old, _ in ex.lib.blocks:
+        new = old.copy()
+        for s, joints in enumerate(sites):
+            mine = [i for i in best if (ex.data.candidates[i].slug, ex.data.candidates[i].joints)
+                    == (effect.slug, tuple(joints))]  # fmt: skip
+            if mine and effect.refines():
+                best[mine[0]], peak = _peak(ex, mine[0])
+                new[s] = effect.finer(old[s], effect.shape_of(amplitudes[mine[0]], peak))
+            elif effect.scouts and not mine:
+                new[s] = suggested(effect, left, ex.scales, joints, old[s])
+        shapes.append(new)
+    refined = reshaped(ex.lib, shapes)
+    return refined, tuple(_same(ex.data.candidates[i], shape, i, refined) for i, shape in best.items())
+
+
+def _coarse(ex: Explanation, left: Noise) -> bool:
+    """Whether finer shapes may still leave less at some joint: the noise left there is not yet what it was thought.
+
+    Args:
+        ex: The explanation.
+        left: Noise that it leaves.
+    """
+    shaped = [j for m in ex.members if m.effect.refines() for j in m.joints]
+    was, now = (np.sqrt(np.mean(noise.total**2, axis=0)) for noise in (ex.noise, left))
+    return bool(np.any(np.abs(np.log(now / was))[shaped] > SETTLED))
+
+
+def _peak(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """The best point of a member's grid, and where the grid is at its best to a fraction of its steps."""
+    mine = ex.data.candidates[index]
+    grid, odds = _grid_of(ex, index)
+    best = grid[np.argmax(odds)] if np.isfinite(odds).any() else mine.shape
+    return best, mine.effect.peak(grid, best, odds)
+
+
+def _grid_of(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """A member's grid, shape (points, shape parameters), and log odds of its points beside the other members."""
+    candidates, mine = ex.data.candidates, ex.data.candidates[index]
+    site = (mine.slug, mine.joints, mine.variant)
+    same = [i for i, c in enumerate(candidates) if (c.slug, c.joints, c.variant) == site]
+    return np.array([candidates[i].shape for i in same]), ex.gains(ex.others(index), same)
+
+
+def _same(c: Candidate, shape: np.ndarray, index: int, lib: Library) -> int:
+    """The candidate of a library nearest to a shape of one before; loose inertials keep their place at the end."""
+    if c.slug == "inertials":
+        return index
+    site = (c.slug, c.joints, c.variant)
+    alike = [i for i, o in enumerate(lib.candidates) if (o.slug, o.joints, o.variant) == site]
+    return min(alike, key=lambda i: float(np.sum(np.abs(lib.candidates[i].shape - shape))))

@@ -1,0 +1,195 @@
+"""A set of candidates beside the rigid body: what it is in the data, and how probable it and its members are."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from irb140_jax.effects import Scales
+from irb140_jax.mismatch.columns.candidates import Candidate, Library
+from irb140_jax.mismatch.inertials.bodies import of_bodies
+from irb140_jax.mismatch.regression.assemble import Data
+from irb140_jax.mismatch.regression.gaussian import Posterior
+from irb140_jax.mismatch.regression.gram import LEVELS
+from irb140_jax.mismatch.regression.noise import Noise
+from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON, Nuisances
+from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities
+from irb140_jax.mismatch.selection.evidence import Settings, Space
+
+
+@dataclasses.dataclass(frozen=True)
+class Explanation:
+    """What explains the recordings, and everything needed to judge it.
+
+    Attributes:
+        lib: The library in its last state: refined shapes.
+        scales: Sizes of the recordings.
+        data: Low-passed rows.
+        extra: Nuisance columns and the discrepancy's, one per recording.
+        noise: What whitens the rows.
+        space: Gram matrices and priors.
+        chosen: Indices of the candidates that are named.
+        settings: Sizes of the discrepancy and noise levels of each joint beside them.
+        sets: Log posterior of every set that the search visited.
+        factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
+        scaled: Whether one scale of all logged torques is a finding.
+    """
+
+    lib: Library
+    scales: Scales
+    data: Data
+    extra: list[Nuisances]
+    noise: Noise
+    space: Space
+    chosen: tuple[int, ...]
+    settings: Settings
+    sets: Sets
+    factor: np.ndarray
+    scaled: bool = False
+
+    @property
+    def members(self) -> list[Candidate]:
+        """The chosen candidates."""
+        return [self.data.candidates[c] for c in self.chosen]
+
+    @property
+    def level(self) -> np.ndarray:
+        """Standard deviation of the noise that is left at each joint, shape (n,) [N m or N]."""
+        return np.sqrt(np.mean(self.noise.total**2, axis=0)) * [LEVELS[s[-1]] for s in self.settings]
+
+    def columns(self, chosen: tuple[int, ...] | None = None) -> np.ndarray:
+        """Columns of the data that a set uses: inertials, then the amplitudes of its candidates."""
+        chosen = self.chosen if chosen is None else chosen
+        own = [self.data.nuisances + self.data.candidates[c].columns for c in chosen]
+        return np.concatenate([np.arange(self.data.nuisances), *own])
+
+    def others(self, index: int) -> tuple[int, ...]:
+        """The chosen candidates but one."""
+        return tuple(c for c in self.chosen if c != index)
+
+    def log_posterior(self, chosen: Sequence[int], joints: Sequence[int] | None = None) -> float:
+        """Log posterior of a set, sizes and levels fitted to it anew, at some joints or all.
+
+        Without a member, others may have another shape.
+        """
+        value, members = -np.inf, tuple(sorted(chosen))
+        for other in dict.fromkeys((members, self.space.reshaped(members, self.settings))):
+            known = self.sets.get(frozenset(other))
+            value = max(value, self.space.settled(other, self.settings, joints)[0] if known is None else known)
+        return value
+
+    def gains(self, chosen: tuple[int, ...], which: Sequence[int]) -> np.ndarray:
+        """Log posterior odds of adding each of some candidates to a set, -inf where inadmissible."""
+        return self.space.gains(chosen, self.settings, np.asarray(which, dtype=int))
+
+    def near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
+        """Gram matrix of some amplitudes' columns and y; inertials, nuisances and a set's amplitudes integrated out.
+
+        Args:
+            chosen: The set.
+            columns: Columns of amplitudes, numbered from the first amplitude.
+        """
+        return self.space.near(chosen, self.settings, columns + self.space.offset)
+
+    def posterior(
+        self, chosen: tuple[int, ...] | None = None, without: np.ndarray | None = None, *, instrument: bool = True
+    ) -> Posterior:
+        """Inertials and amplitudes in prior units, with discrepancy and nuisance parameters integrated out.
+
+        Args:
+            chosen: Which candidates, by default those that are named.
+            without: Which blocks of the data are left out, shape (blocks,).
+            instrument: Whether the instrument may err within its stated widths.  For predictions it is taken to be
+                right but for what is named.
+        """
+        chosen = self.chosen if chosen is None else chosen
+        space = self.space if without is None else self.space.without(without)
+        mean, cov = space.posterior(chosen, self.settings, instrument=instrument, scaled=self.scaled)
+        keep = np.r_[0 : self.space.inertials, self.space.offset : len(mean)]
+        return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
+
+    def torque_scale(self) -> tuple[float, float]:
+        """Logged over real torque of all joints alike, less one: mean and standard deviation."""
+        mean, cov = self.space.posterior(self.chosen, self.settings)
+        at = self.space.inertials
+        return GAIN_COMMON * float(mean[at]), GAIN_COMMON * float(np.sqrt(cov[at, at]))
+
+    def prediction(self, without: np.ndarray | None = None) -> tuple[Posterior, float, list[np.ndarray]]:
+        """What predicts: possible inertials and amplitudes, the torque scale less one, and each joint's own columns.
+
+        Args:
+            without: Which blocks of the data are left out, shape (blocks,).
+        """
+        space = self.space if without is None else self.space.without(without)
+        mean, cov = space.posterior(self.chosen, self.settings, instrument=False, scaled=self.scaled)
+        mean = self.of_bodies(mean, cov, self.chosen, space.offset)
+        columns = space.set_columns(self.chosen)
+        own = [space.own(j, s, columns, mean, instrument=False) for j, s in enumerate(self.settings)]
+        keep = np.r_[0 : space.inertials, space.offset : len(mean)]
+        post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
+        return post, GAIN_COMMON * float(mean[space.inertials]), own
+
+    def beside_instrument(self, without: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+        """Inertials and amplitudes, common nuisances, and each joint's own fixed ones: nothing of the discrepancy.
+
+        Args:
+            without: Which blocks of the data are left out, shape (blocks,).
+        """
+        space = self.space.without(without)
+        mean, _ = space.posterior(self.chosen, self.settings)
+        columns, keep = space.set_columns(self.chosen), np.r_[0 : space.inertials, space.offset : len(mean)]
+        own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(self.settings)]
+        fixed = [np.where(g.groups < 0, v, 0.0) for g, v in zip(space.joints, own, strict=True)]
+        return mean[keep], mean[space.inertials : space.offset], fixed
+
+    def of_bodies(self, mean: np.ndarray, cov: np.ndarray, chosen: tuple[int, ...], first: int) -> np.ndarray:
+        """A posterior mean moved to the most probable inertials that bodies can have; all else moves along.
+
+        Args:
+            mean, cov: Of inertials first and a set's amplitudes last, in prior units.
+            chosen: The set.
+            first: Column of its first amplitude.
+        """
+        size = self.space.inertials
+        into = np.zeros((size, len(mean)))
+        into[:, :size] = np.diag(self.data.scale[:size])
+        for c in (self.data.candidates[i] for i in chosen):
+            own = first + np.arange(len(c.columns))
+            if c.slug == "inertials":
+                rows = (10 * np.array(c.joints)[:, None] + np.arange(10)).ravel()
+                into[rows, own] = self.data.scale[self.data.nuisances + c.columns]
+            first += len(own)
+        return of_bodies(mean, cov, into, np.asarray(self.lib.robot.phi), self.factor)
+
+    def probability(self, index: int) -> float:
+        """Of a chosen candidate's effect at its joints, over all sets visited."""
+        c = self.data.candidates[index]
+        return probabilities(self.data.candidates, self.sets).get((c.slug, c.joints), 0.0)
+
+    def rivals(self, index: int) -> dict[Site, float]:
+        """Share of the sets in which another effect stands in a chosen candidate's place, by that effect."""
+        return in_its_place(self.data.candidates, self.sets, self.chosen, index)[0]
+
+
+def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:
+    """Where each member of a set has its amplitudes in a posterior of inertials and amplitudes, (len(chosen),)."""
+    widths = [len(data.candidates[i].columns) for i in chosen]
+    ends = data.nuisances + np.cumsum(widths, dtype=int)
+    return [slice(int(end) - width, int(end)) for end, width in zip(ends, widths, strict=True)]
+
+
+def fitted(
+    data: Data, post: Posterior, chosen: tuple[int, ...], factor: np.ndarray
+) -> tuple[np.ndarray, list[Candidate], list[np.ndarray]]:
+    """Shift of the inertial parameters (10 n,), and the named effects with their amplitudes, from a posterior."""
+    w = post.mean * data.scale[post.columns]
+    dphi, members, amplitudes = factor @ w[: data.nuisances], [], []
+    for i, part in zip(chosen, parts(data, chosen), strict=True):
+        c = data.candidates[i]
+        if c.slug == "inertials":
+            rows = (10 * np.array(c.joints)[:, None] + np.arange(10)).ravel()
+            dphi = dphi + factor[:, rows] @ w[part]
+        else:
+            members.append(c)
+            amplitudes.append(w[part])
+    return dphi, members, amplitudes

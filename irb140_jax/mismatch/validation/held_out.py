@@ -1,0 +1,237 @@
+"""Does it hold on data that the fit did not see?  Motions, or blocks of a single one, are left out in turn."""
+
+import dataclasses
+
+import numpy as np
+
+from irb140_jax.mismatch.regression.assemble import BLOCKS
+from irb140_jax.mismatch.regression.gaussian import Posterior, grams, posterior
+from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals
+from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
+from irb140_jax.mismatch.regression.rows import Stretch
+from irb140_jax.mismatch.selection.explanation import Explanation, parts
+
+ALONE = 0.8  # share of a joint's usable rows, or of a finding's torque, without which nothing is known of it
+SETTLED = 2  # rounds in which the noise and what leaves it agree
+
+
+@dataclasses.dataclass(frozen=True)
+class Fold:
+    """What is left out together, and what the other blocks say.
+
+    Attributes:
+        blocks: Which blocks are left out, shape (blocks,).
+        refit: Inertials without effects.
+        corrected: Inertials and amplitudes of the findings.
+        scale: Torque scale less one.
+    """
+
+    blocks: np.ndarray
+    refit: Posterior
+    corrected: Posterior
+    scale: float
+
+
+@dataclasses.dataclass(frozen=True)
+class HeldOut:
+    """Residuals on rows that the fit behind them did not see, one array (R, n) per recording [N m or N].
+
+    Attributes:
+        nominal: Of the model as given.
+        refit: Of the rigid body with refitted inertials.
+        named: Of refit and findings together.
+        left: The same, with errors of the instrument at joints where they explain some of it: what smoothing takes off
+            accelerations is no physics.
+        corrected: The same, with the discrepancy where it is carried.
+        use: Rows that count, (R, n).
+        carried: Joints at which the discrepancy makes the error on unseen data smaller, shape (n,).
+        folds: The fits behind them.
+    """
+
+    nominal: list[np.ndarray]
+    refit: list[np.ndarray]
+    named: list[np.ndarray]
+    left: list[np.ndarray]
+    corrected: list[np.ndarray]
+    use: list[np.ndarray]
+    carried: np.ndarray
+    folds: tuple[Fold, ...] = ()
+
+    @property
+    def judged(self) -> np.ndarray:
+        """Joints of which there are rows to judge by, shape (n,)."""
+        return np.any([u.any(axis=0) for u in self.use], axis=0)
+
+    def without_discrepancy(self, joints: np.ndarray) -> "HeldOut":
+        """The same where some joints, shape (n,), carry no discrepancy."""
+        corrected = [np.where(joints, n, c) for n, c in zip(self.named, self.corrected, strict=True)]
+        return dataclasses.replace(self, corrected=corrected, carried=self.carried & ~joints)
+
+    def rmse(self, residuals: list[np.ndarray]) -> np.ndarray:
+        """RMS over the rows that count, shape (n,)."""
+        squares = sum(np.sum(np.where(u, r, 0.0) ** 2, axis=0) for r, u in zip(residuals, self.use, strict=True))
+        return np.sqrt(squares / np.maximum(sum(u.sum(axis=0) for u in self.use), 1))
+
+
+def folds(ex: Explanation) -> list[np.ndarray]:
+    """Blocks to leave out together: a motion each, with all that repeat it, or contiguous blocks of the only one.
+
+    A motion that all but alone moves some joint, or all but alone holds what a finding does, is left out block by
+    block, too: without it nothing is known there, and a wall that is touched once would drown all else.
+    """
+    recording = recordings_of_blocks(ex)
+    out, weight = [], np.vstack([np.stack([g.rows for g in ex.space.joints]), _energy(ex, ex.chosen)])
+    weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
+    of_recording = np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches])
+    motion, number = of_recording[recording], np.tile(np.arange(BLOCKS), len(ex.data.stretches))
+    for m in dict.fromkeys(motion.tolist()):
+        mine = motion == m
+        alone = np.max(weight[:, mine].sum(axis=1)) > ALONE
+        out += [mine & (number == k) for k in np.unique(number[mine])] if alone else [mine]
+    return out
+
+
+def recordings_of_blocks(ex: Explanation) -> np.ndarray:
+    """Recording of each block, shape (blocks,)."""
+    return np.repeat([s.recording for s in ex.data.stretches], BLOCKS)
+
+
+def _energy(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:
+    """Squared whitened torque of each member of a set in each block, shape (members, blocks)."""
+    mean, space = ex.posterior(chosen, instrument=False).mean, ex.space
+    out = np.zeros((len(chosen), len(space.joints[0].blocks)))
+    for k, (c, part) in enumerate(zip(chosen, parts(ex.data, chosen), strict=True)):
+        for g, place in zip(space.joints, space.places, strict=True):
+            at = place[space.columns[c]]
+            w, at = mean[part][at >= 0], at[at >= 0] + len(g.groups)
+            out[k] += np.einsum("i,bij,j->b", w, g.blocks[:, at[:, None], at], w)
+    return out
+
+
+@dataclasses.dataclass(frozen=True)
+class Refit:
+    """The rigid body with refitted inertials and nothing else.
+
+    Attributes:
+        ex: The explanation that it stands beside.
+        loose: Its candidates that stand for inertials wrong beyond their stated uncertainty: free here too.
+        grams: Gram matrices of their columns and the inertials' alone, by block, under the noise that they leave, shape
+            (blocks, K + 1, K + 1).
+        prior: Standard deviations of the columns' prior, in units of those that were stated: of the explanation.
+    """
+
+    ex: Explanation
+    loose: tuple[int, ...]
+    grams: np.ndarray
+    prior: np.ndarray
+
+    @property
+    def columns(self) -> np.ndarray:
+        """Which of all columns those are."""
+        return self.ex.columns(self.loose)
+
+    def posterior(self, without: np.ndarray | None = None) -> Posterior:
+        """Inertials of possible bodies from all blocks, or from all but some."""
+        blocks = self.grams if without is None else self.grams[~without]
+        post = posterior(blocks.sum(axis=0), np.arange(len(self.columns)), prior=self.prior)
+        mean = self.ex.of_bodies(post.mean, post.cov, self.loose, self.ex.data.nuisances)
+        return Posterior(self.columns, mean, post.cov)
+
+
+def refitted(ex: Explanation) -> Refit:
+    """Refit the inertials beside an explanation."""
+    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
+    columns = ex.columns(loose)
+    stretches = [s.of_rigid_body(columns) for s in ex.data.stretches]
+    scale, prior = ex.data.scale[columns], np.ones(len(columns))
+    prior[: ex.data.nuisances] = ex.space.width(ex.chosen, ex.settings)
+    noise = _noise_left(stretches, scale, prior, ex.noise)
+    return Refit(ex, loose, grams(stretches, noise, scale, BLOCKS), prior)
+
+
+def _noise_left(stretches: list[Stretch], scale: np.ndarray, prior: np.ndarray, noise: Noise) -> Noise:
+    """Noise that columns leave, fitted under noise that was guessed before, and again under what they leave."""
+    every, n = np.arange(len(scale)), stretches[0].y.shape[1]
+    for _ in range(SETTLED):
+        post = posterior(grams(stretches, noise, scale, 1).sum(axis=0), every, prior=prior)
+        residuals = [s.y - s.X @ (post.mean * scale) for s in stretches]
+        # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
+        dof = np.full(n, (len(scale) - float(np.sum(np.diag(post.cov) / prior**2))) / n)
+        noise = noise_from_residuals(residuals, [s.use for s in stretches], dof, [s.unsure for s in stretches])
+    return noise
+
+
+def held_out(ex: Explanation, refit: Refit) -> HeldOut:
+    """Residuals of the rival models, each row predicted from the other motions (or blocks)."""
+    data, energy, recording = ex.data, _energy(ex, ex.chosen), recordings_of_blocks(ex)
+    seen = ex.posterior(instrument=False).mean
+    bare = [s.of_rigid_body(refit.columns) for s in data.stretches]
+    out = {"refit": [s.y.copy() for s in bare], "named": [s.y.copy() for s in data.stretches]}
+    out["flexible"], out["left"] = ([s.y.copy() for s in data.stretches] for _ in range(2))
+    gains, fits = {"flexible": np.zeros(len(ex.settings)), "left": np.zeros(len(ex.settings))}, []
+    for fold in folds(ex):
+        post, scale, own = ex.prediction(fold)
+        post = dataclasses.replace(post, mean=np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean))
+        fits.append(Fold(fold, refit.posterior(fold), post, scale))
+        corrected = post.mean * data.scale[post.columns]
+        inertial = fits[-1].refit.mean * data.scale[refit.columns]
+        erring, common, errors = ex.beside_instrument(fold)
+        erring = np.where(_only_here(ex, ex.chosen, energy, fold), seen, erring) * data.scale[post.columns]
+        for r, s in enumerate(data.stretches):
+            mine = fold[recording == s.recording]
+            edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
+            for b in np.flatnonzero(mine):
+                rows = slice(edges[b], edges[b + 1])
+                out["refit"][r][rows] -= bare[r].X[rows] @ inertial
+                out["named"][r][rows] -= s.X[rows][..., post.columns] @ corrected
+                out["named"][r][rows] -= scale / GAIN_COMMON * ex.extra[r].common[rows, :, 0]
+                out["left"][r][rows] -= s.X[rows][..., post.columns] @ erring + ex.extra[r].common[rows] @ common
+                out["left"][r][rows] -= np.stack(
+                    [x[rows] @ v for x, v in zip(ex.extra[r].own, errors, strict=True)], axis=1
+                )
+                delta = np.stack([x[rows] @ v for x, v in zip(ex.extra[r].own, own, strict=True)], axis=1)
+                out["flexible"][r][rows] = out["named"][r][rows] - delta
+                for which, gain in gains.items():
+                    old, new = (np.where(s.use[rows], out[k][r][rows], 0.0) for k in ("named", which))
+                    gain += np.sum(old**2 - new**2, axis=0)
+    nominal, use = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches]
+    carried, left = (
+        [np.where(gains[k] > 0.0, better, named) for better, named in zip(out[k], out["named"], strict=True)]
+        for k in ("flexible", "left")
+    )
+    return HeldOut(
+        nominal, out["refit"], out["named"], left, carried, use, gains["flexible"] > 0.0, tuple(fits)
+    )
+
+
+def held_out_gains(ex: Explanation) -> dict[int, float]:
+    """Share of the whitened squared error on unseen data, noise included, that each finding removes."""
+    left_out = folds(ex)
+    whole = _unseen_error(ex, ex.chosen, left_out)
+    without = {i: _unseen_error(ex, ex.others(i), left_out) for i in ex.chosen}
+    return {i: (error - whole) / max(error, 1e-300) for i, error in without.items()}
+
+
+def _unseen_error(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> float:
+    """Whitened squared error of a set on data that its fit did not see."""
+    space, error, energy = ex.space, 0.0, _energy(ex, chosen)
+    columns = space.with_y(space.set_columns(chosen))
+    seen = ex.posterior(chosen, instrument=False).mean
+    for fold in left_out:
+        only = _only_here(ex, chosen, energy, fold)
+        mean = np.where(only, seen, ex.posterior(chosen, fold, instrument=False).mean)
+        w = np.zeros(len(columns))
+        w[: space.inertials], w[space.offset : -1], w[-1] = mean[: space.inertials], mean[space.inertials :], -1.0
+        for g, place in zip(space.joints, space.places, strict=True):
+            at = place[columns]
+            v, at = w[at >= 0], at[at >= 0] + len(g.groups)
+            error += float(v @ g.blocks[fold].sum(axis=0)[np.ix_(at, at)] @ v)
+    return error
+
+
+def _only_here(ex: Explanation, chosen: tuple[int, ...], energy: np.ndarray, fold: np.ndarray) -> np.ndarray:
+    """Columns of members that only this fold can tell of: they happen once, or nearly all of their torque is in it."""
+    members = [ex.data.candidates[i] for i in chosen]
+    alone = energy[:, fold].sum(axis=1) > ALONE * energy.sum(axis=1)
+    each = [np.full(len(c.columns), c.effect.once or a) for c, a in zip(members, alone, strict=True)]
+    return np.concatenate([np.zeros(ex.data.nuisances, dtype=bool), *each])

@@ -1,0 +1,199 @@
+"""Physical parameters of a finding, and how well the data know them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from irb140_jax.effects.grids import nearest_in_each_direction
+from irb140_jax.mismatch.columns.candidates import Candidate
+from irb140_jax.mismatch.regression.scout import left_over
+from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.robot import Robot
+
+NEIGHBOURS = 12  # shapes around the named one that tell how finely its grid resolves each parameter
+SMALL = 1e-6  # of an amplitude's prior: step of a slope
+FAR = 1e5  # steps of the grid: prior standard deviation of a shape where nothing is known of it
+UNSEEN = 3.0  # a direction taken at random has six times as much of what isn't seen in one case of ten
+
+
+def parameters_of(
+    robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray
+) -> dict[str, Any]:
+    """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt.
+
+    Args:
+        robot: The nominal model.
+        ex: The explanation.
+        index: The finding among its candidates.
+        w: Amplitudes of the finding, shape (k,).
+        cov: Their covariance, shape (k, k).
+
+    Returns:
+        By parameter: `value` and `std` in SI units, and the `unit`.
+    """
+    c = ex.data.candidates[index]
+    value = _physical(c, w)
+    over_shapes = np.maximum(_variance_over_shapes(ex, index, value), _variance_about_shape(ex, index, w))
+    w, cov = _of_all_columns(ex, index, w, cov)
+    physical = lambda w: np.asarray(c.effect.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
+    variance = _variance_of(physical, w, cov, value) + over_shapes
+    variance = variance + _variance_over_variants(ex, index, value)
+    if c.effect.leans_on_inertials:
+        variance = variance + (value * _inertial_doubt(ex, c)) ** 2
+    if c.effect.scouts:
+        alike = c.effect.alike(left_over(ex.data, np.zeros(0, dtype=int), ex.noise.total), w, c.shape)
+        variance = variance + np.sum((alike - value) ** 2, axis=0) / 2.0
+    slide = robot.is_slide[c.joints[0]]
+    return {
+        parameter.name: {
+            "value": float(value[i]), "std": float(np.sqrt(max(variance[i], 0.0))),
+            "unit": c.effect.unit(parameter, slide),
+        }
+        for i, parameter in enumerate(c.effect.parameters)
+    }  # fmt: skip
+
+
+def _variance_of(
+    physical: Callable[[np.ndarray], np.ndarray], w: np.ndarray, cov: np.ndarray, value: np.ndarray
+) -> np.ndarray:
+    """Mean square of what physical parameters are off by, their amplitudes being normal.
+
+    By points at plus and minus sqrt(n) standard deviations along each axis (spherical cubature), exact to third order:
+    a slope would be sure of the size of a tilt of which only one component shows.
+
+    Source: Arasaratnam and Haykin, IEEE Trans. Automatic Control 54(6) (2009), cubature rule of third degree.
+    """
+    size, axes = np.linalg.eigh(cov)
+    steps = (np.sqrt(len(w) * np.maximum(size, 0.0)) * axes).T
+    return np.mean([(physical(w + step) - value) ** 2 for step in (*steps, *-steps)], axis=0)
+
+
+def _of_all_columns(ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitudes and covariance of all columns of an effect: those unused are zero but for what the data leave open.
+
+    Of a vector's components those that move nothing are zero, too, give or take `UNSEEN` times what the others are.
+    """
+    c = ex.data.candidates[index]
+    width = max(max(v) for v in c.effect.variants) + 1
+    columns = c.columns[0] - c.variant[0] + np.arange(width)
+    H = ex.near(ex.chosen, columns)
+    scale = ex.data.scale[ex.data.nuisances + columns]
+    full, spread = np.zeros(width), np.diag(scale**2 / (1.0 + np.diag(H)[:-1]))
+    used = list(c.variant)
+    full[used] = w
+    spread[used] = spread[:, used] = 0.0
+    spread[np.ix_(used, used)] = cov
+    unseen = scale == 0.0
+    if c.effect.vector and unseen.any() and not unseen.all():
+        spread[unseen, unseen] = UNSEEN**2 * np.mean(full[~unseen] ** 2)
+    return full, spread
+
+
+def _physical(c: Candidate, w: np.ndarray) -> np.ndarray:
+    """Physical parameters from the amplitudes that a candidate uses."""
+    full = np.zeros(max(max(v) for v in c.effect.variants) + 1)
+    full[list(c.variant)] = w
+    return np.asarray(c.effect.physical(jnp.asarray(full), jnp.asarray(c.shape)))
+
+
+def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:
+    """Variance of the physical parameters over the refined grid of shapes, amplitudes fitted anew at each.
+
+    Args:
+        ex: The explanation.
+        index: The finding.
+        value: Its physical parameters.
+    """
+    c = ex.data.candidates[index]
+    if not c.effect.refines():
+        return np.zeros(len(value))
+    alike = [
+        i
+        for i, o in enumerate(ex.data.candidates)
+        if o.slug == c.slug and o.joints == c.joints and o.variant == c.variant
+    ]
+    gain = ex.gains(ex.others(index), alike)
+    loss = np.where(np.isfinite(gain), gain[alike.index(index)] - gain, np.inf)
+    p = np.exp(-np.clip(loss - loss.min(), 0.0, 700.0)) if np.isfinite(loss).any() else np.ones(len(alike))
+    p /= p.sum()
+    shapes = np.array([ex.data.candidates[i].shape for i in alike])
+    off = np.abs(shapes - c.shape) / np.maximum(np.ptp(shapes, axis=0), 1e-300)
+    nearest = set(np.argsort(off.sum(axis=1))[1 : 1 + NEIGHBOURS].tolist())
+    refitted = {k: _refitted(ex, index, alike[k]) for k in range(len(alike)) if p[k] > 1e-3 or k in nearest}
+    between = np.sum([p[k] * (v - value) ** 2 for k, v in refitted.items()], axis=0)
+    steps = np.array([np.abs(refitted[k] - value) for k in nearest]).reshape(-1, len(value))
+    # A grid narrower than the posterior: the loss to a neighbour, taken for a parabola, says how far it reaches.
+    lost = np.array([max(loss[k], 0.5) for k in nearest]).reshape(-1, 1)
+    beyond = np.max(steps**2 / (2.0 * lost), axis=0, initial=0.0)
+    # A posterior narrower than the grid is known to the grid's spacing.
+    spacing = np.min(np.where(steps > 1e-9 * np.abs(value), steps, np.inf), axis=0, initial=np.inf)
+    spacing = np.where(np.isfinite(spacing), spacing, 0.0)
+    return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + c.effect.blur(c.shape) ** 2
+
+
+def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray) -> np.ndarray:
+    """Variance of the physical parameters about the named shape, its parameters and the amplitudes all free at once.
+
+    By the law's tangent: a grid that moves one parameter of the shape at a time does not see that a wall which leans
+    more and stands further off is felt alike.
+
+    Args:
+        ex: The explanation.
+        index: The finding.
+        w: Its amplitudes.
+    """
+    c, data = ex.data.candidates[index], ex.data
+    alike = [o for o in data.candidates if (o.slug, o.joints, o.variant) == (c.slug, c.joints, c.variant)]
+    directions = nearest_in_each_direction(np.array([o.shape for o in alike]), c.shape)
+    near = [alike[points[0]] for points in directions]
+    if not (c.effect.refines() and near):
+        return np.zeros(len(c.effect.parameters))
+    columns = np.concatenate([c.columns, *(o.columns for o in near)])
+    scale, k = data.scale[data.nuisances + columns], len(w)
+    per_scale = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)  # zero: it moves nothing
+    H = ex.near(ex.others(index), columns)[:-1, :-1]
+    # Amplitudes, and for each near shape the difference that its columns make at the amplitudes found.
+    along = np.eye(k, len(columns))
+    to = np.kron(np.eye(len(near)), w)
+    along = np.vstack([along, np.hstack([-np.tile(w, (len(near), 1)), to]) * per_scale])
+    prior = np.concatenate([np.ones(k), np.full(len(near), FAR**-2)])
+    cov = np.linalg.inv(along @ H @ along.T + np.diag(prior))
+    value = _physical(c, w)
+    slope = [(_physical(c, w + SMALL * step) - value) / SMALL for step in np.diag(scale[:k])]
+    slope += [_physical(o, w) - value for o in near]
+    return np.einsum("ip,ij,jp->p", slope, cov, slope)
+
+
+def _variance_over_variants(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:
+    """Mean square by which the physical parameters of the same law with other columns differ, as probable as it is."""
+    c = ex.data.candidates[index]
+    forms = [
+        i
+        for i, o in enumerate(ex.data.candidates)
+        if (o.slug, o.joints) == (c.slug, c.joints) and o.variant != c.variant and np.array_equal(o.shape, c.shape)
+    ]
+    gains = ex.gains(ex.others(index), [*forms, index])
+    # What is not admissible has a gain of minus infinity.
+    known = np.isfinite(gains[:-1]) & np.isfinite(gains[-1])
+    forms = [i for i, k in zip(forms, known, strict=True) if k]
+    weight = np.exp(np.clip(gains[:-1][known] - gains[-1], -50.0, 50.0))
+    differ = np.array([(_refitted(ex, index, i) - value) ** 2 for i in forms]).reshape(-1, len(value))
+    return weight @ differ / (1.0 + weight.sum())
+
+
+def _refitted(ex: Explanation, index: int, other: int) -> np.ndarray:
+    """Physical parameters where another candidate of the same kind stands in a finding's place."""
+    post = ex.posterior((*ex.others(index), other))
+    c = ex.data.candidates[other]
+    k = len(c.columns)
+    return _physical(c, (post.mean * ex.data.scale[post.columns])[-k:])
+
+
+def _inertial_doubt(ex: Explanation, c: Candidate) -> float:
+    """Relative standard deviation left in the inertials of the links that a joint carries, root mean square."""
+    post = ex.posterior()
+    carried = slice(10 * min(c.joints), ex.data.nuisances)
+    return float(ex.data.scale[0] * np.sqrt(np.mean(np.diag(post.cov)[carried])))
+

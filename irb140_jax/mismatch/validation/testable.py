@@ -1,0 +1,171 @@
+"""What these recordings could have shown and what not: every effect, at a strength that matters on a lively motion.
+
+Along a slow motion hardly anything is large, so a share of the torque there says nothing: 6 % of it would be a rotor as
+heavy as the arm.  Strengths are therefore those of a lively motion of the same robot within its limits.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from scipy import ndimage
+
+from irb140_jax.effects import AbstractEffect, Scales
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.columns.along import columns_along, prepared
+from irb140_jax.mismatch.columns.candidates import Library
+from irb140_jax.mismatch.regression.gaussian import eliminated
+from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.excite import Excitation, fourier_motion, within
+from irb140_jax.robot import Robot
+
+REFERENCE_SHARE = 0.06  # an effect of this share of the joint's torque along a lively motion should be seen ...
+VISIBLE = 5.0  # ... with this many standard deviations, or the motion can't test it
+LIVELY = {"duration": 10.0, "speed": 0.6, "seed": 1}  # the reference motion: 60 % of the speed limits
+
+
+class AtSite(Protocol):
+    """An effect at a site: a candidate, or what is kept of one."""
+
+    @property
+    def effect(self) -> AbstractEffect: ...  # noqa: D102
+
+    @property
+    def joints(self) -> tuple[int, ...]: ...  # noqa: D102
+
+
+ROUNDED = 3.0  # times the speed of rest: from there sign(qd) is right to half a percent
+LEAK = 0.1  # [s] over which the low-pass spreads what happens at a reversal
+Site = tuple[str, tuple[int, ...]]
+
+
+class Reference(NamedTuple):
+    """What matters on the lively motion.
+
+    Attributes:
+        amplitudes: Of every column of the library, that is `REFERENCE_SHARE` of a joint's torque; zero for columns that
+            are zero there, too; shape (lib.size,).
+        torque: RMS of the nominal model's torque [N m or N], shape (n,).
+    """
+
+    amplitudes: np.ndarray
+    torque: np.ndarray
+
+    def in_prior_units(self, columns: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """Amplitudes of some columns over their prior scale; zero for what these recordings hardly excite at all."""
+        amplitudes = self.amplitudes[columns]
+        excited = scale > 1e-9 * np.abs(amplitudes)
+        return np.divide(amplitudes, scale, out=np.zeros(len(scale)), where=excited)
+
+
+def reference(lib: Library, scales: Scales, rate: float) -> Reference:
+    """Drive the nominal model along the lively motion.
+
+    Args:
+        lib: The library.
+        scales: Sizes of the recordings, for robots without limits.
+        rate: Of the samples [1/s].
+    """
+    robot = within(lib.robot, scales.low, scales.high)
+    motion = played(fourier_motion(robot, rate=rate, **LIVELY), scales.rest_speed)
+    along = columns_along(lib, prepared(lib.robot, motion))
+    torque, amplitudes = np.sqrt(np.mean(along.nominal**2, axis=0)), np.zeros(lib.size)
+    for effect, sites, shapes, first in lib.blocks:
+        width = max(max(v) for v in effect.variants) + 1
+        own = np.arange(width)[list(effect.own)]
+        together = [(own, effect.likely(lib.robot)), *(([k], [1.0]) for k in range(width) if k not in own)]
+        for k in range(len(sites) * shapes.shape[1]):
+            # Of the joints it acts on: all of them, for effects that act everywhere.
+            joints = slice(None) if effect.everywhere else sites[k // shapes.shape[1]]
+            for part, likely in together:
+                columns = first + k * width + np.asarray(part)
+                power = np.mean(lib.torque(along.effects, columns, np.asarray(likely)) ** 2, axis=0).sum()
+                if power > 0.0:
+                    amplitudes[columns] = np.asarray(likely) * REFERENCE_SHARE * np.linalg.norm(torque[joints])
+                    amplitudes[columns] /= np.sqrt(power)
+                    most = effect.highest(lib.robot, sites[k // shapes.shape[1]])[part]
+                    amplitudes[columns] *= np.min(np.minimum(most / np.maximum(amplitudes[columns], 1e-300), 1.0))
+    return Reference(amplitudes, torque)
+
+
+def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
+    """A motion as if it were recorded, without torque; near rest, where sign(qd) is rounded off, nothing is usable.
+
+    Laws that agree but for that rounding would seem to differ there.
+    """
+    rounded = np.abs(motion.qd) < ROUNDED * rest_speed
+    around = 2 * int(np.ceil(LEAK / (motion.t[1] - motion.t[0]))) + 1
+    usable = ~ndimage.maximum_filter1d(rounded.astype(np.uint8), around, axis=0).astype(bool)
+    direction, torque = np.tanh(motion.qd / rest_speed), np.zeros_like(motion.q)
+    moving = (motion.name, motion.t, motion.q, motion.qd, motion.qdd, torque, usable)
+    return Conditioned(*moving, rest_speed, np.zeros_like(rest_speed), direction, np.zeros_like(motion.q), ())
+
+
+def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, int]]:
+    """Of every effect at every site: how far it would stand out of the noise, and its candidate.
+
+    Not of those that are named or part of a named one.
+
+    Args:
+        ex: The explanation; inertials and named effects are free.
+        matters: From `reference`.
+
+    Returns:
+        Standard deviations and index of the candidate that stands out most.
+    """
+    H = ex.near(ex.chosen, np.arange(len(ex.data.scale) - ex.data.nuisances))
+    seen: dict[Site, tuple[float, int]] = {}
+    for i, c in enumerate(ex.data.candidates):
+        if c.effect.silent or any(_related(c, m) for m in ex.members):
+            continue
+        if c.effect.scouts and not matters.amplitudes[c.columns].any():
+            continue  # a wall or a push at no place or time in particular
+        scale = ex.data.scale[ex.data.nuisances + c.columns]
+        strength = matters.in_prior_units(c.columns, scale)
+        z = stands_out(H, c, c.columns, strength, ex.members)
+        if z >= seen.get((c.slug, c.joints), (-1.0, 0))[0]:
+            seen[c.slug, c.joints] = z, i
+    return seen
+
+
+def stands_out(
+    H: np.ndarray, candidate: AtSite, columns: np.ndarray, strength: np.ndarray, members: Sequence[AtSite]
+) -> float:
+    """Standard deviations by which an effect stands out, in what it has beyond its special case.
+
+    Args:
+        H: Gram matrix with inertials and named effects eliminated.
+        candidate: The effect at a site.
+        columns: Its columns in H.
+        strength: Amplitude of each in prior units.
+        members: The named effects.
+    """
+    effect = candidate.effect
+    own = np.arange(len(columns))[list(effect.own)]
+    simple = set(effect.contains)
+    # A named law at the site that is or has the special case is eliminated already.
+    there = any(m.joints == candidate.joints and simple & {m.effect.slug, *m.effect.contains} for m in members)
+    special = np.zeros(0, dtype=int) if there or not simple else np.delete(np.arange(len(columns)), own)
+    left, _ = eliminated(H[np.ix_(columns, columns)], special)
+    size = strength[own] @ left[np.ix_(own, own)] @ strength[own]
+    return float(np.sqrt(max(size, 0.0)))
+
+
+def _related(one: AtSite, member: AtSite) -> bool:
+    """Whether an effect is a named one or a part of it."""
+    a, b = one.effect, member.effect
+    return one.joints == member.joints and (a.slug == b.slug or a.slug in b.contains)
+
+
+def not_testable(robot: Robot, found: set[str], seen: dict[Site, tuple[float, int]]) -> list[dict[str, Any]]:
+    """Effects that this motion could not have shown, with the joints where that is so, as the contract has them."""
+    blind: dict[str, set[int]] = {}
+    for (slug, joints), (z, _) in seen.items():
+        if z < VISIBLE and slug not in found:
+            blind.setdefault(slug, set()).update(joints)
+    return [
+        {"effect": slug, "joints": [robot.joint_names[j] for j in sorted(joints)],
+         "needs": f"Needs {CATALOGUE[slug].needs}."}
+        for slug, joints in sorted(blind.items())
+    ]  # fmt: skip

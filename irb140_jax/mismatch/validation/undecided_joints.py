@@ -1,0 +1,59 @@
+"""Joints whose motion is too short, or whose remaining error is too large, to tell whether anything is left out."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.recordings.low_pass import Band
+from irb140_jax.robot import Robot
+
+SECONDS = 3.0  # of motion that a joint must show: less is a few reversals, which any law fits
+LARGE = 0.5  # of a joint's torque: an error this large may hide anything
+ABOVE_NOISE = 3.0  # times the sensors' scatter: an error this large is no noise ...
+NOT_SMALL = 0.1  # ... and leaves a joint undecided where it is more than this share of the joint's torque
+
+
+def torque_size(proof: HeldOut, torque: Sequence[np.ndarray]) -> np.ndarray:
+    """Standard deviation of each joint's low-passed torque over the rows that count, shape (n,)."""
+    out = np.zeros(len(proof.carried))
+    for j in range(len(out)):
+        values = np.concatenate([x[u[:, j], j] for x, u in zip(torque, proof.use, strict=True)])
+        out[j] = np.std(values) if len(values) else 0.0
+    return out
+
+
+def undecidable(
+    robot: Robot, proof: HeldOut, torque: Sequence[np.ndarray], scatter: np.ndarray, band: Band
+) -> dict[int, str]:
+    """Joints of which these recordings can't tell whether anything is left out, each with a sentence why.
+
+    Args:
+        robot: The nominal model.
+        proof: Errors on unseen data.
+        torque: Logged torque, low-passed, one array (R, n) per recording.
+        scatter: What the sensors leave, shape (n,).
+        band: Of the comparison.
+    """
+    size, left = torque_size(proof, torque), proof.rmse(proof.corrected)
+    seconds = np.sum([u.sum(axis=0) for u in proof.use], axis=0) * band.step / band.rate
+    out = {}
+    for j in np.flatnonzero(proof.judged):
+        name, unit = robot.joint_names[j], "N" if robot.is_slide[j] else "N m"
+        if seconds[j] < SECONDS:
+            out[int(j)] = (
+                f"{name} moves for only {seconds[j]:.2g} s: record at least {SECONDS:g} s in which it moves, better "
+                "20 s with a dozen reversals"
+            )
+        elif left[j] > LARGE * size[j]:
+            out[int(j)] = (
+                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {100 * left[j] / max(size[j], 1e-300):.0f} % "
+                "of its torque and may hide anything: check its columns and units, and record faster or longer motion"
+            )
+        elif left[j] > max(NOT_SMALL * size[j], ABOVE_NOISE * scatter[j]):
+            times, share = left[j] / max(scatter[j], 1e-300), 100 * left[j] / max(size[j], 1e-300)
+            out[int(j)] = (
+                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {times:.2g} times the noise of the sensors "
+                f"and {share:.0f} % of its torque: check its columns, and record longer motion"
+            )
+    return out

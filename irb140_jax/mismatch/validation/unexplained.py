@@ -1,0 +1,265 @@
+"""Structure that no effect of the library explains: flexible competitors, scored on data that they did not see.
+
+Each competitor knows one group of variables: the joint's position and speed, its load, its past, another joint, time.
+If one of them predicts what the findings leave, something is left out, and its variables say where.  No finding is
+changed by it.
+"""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+from scipy import signal
+
+from irb140_jax.mismatch.regression.noise import spread
+from irb140_jax.mismatch.regression.rows import Stretch
+from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.validation.held_out import HeldOut
+
+FEATURES = 60  # random Fourier features a competitor
+WAVES = 50  # along a joint's range, of the competitor that knows position and direction
+SHIFTS = 99  # circular time shifts that make the null
+MATERIAL_SHARE = 0.05  # of the remaining residual's variance; less is not worth a person's time
+MATERIAL_TORQUE = 0.02  # of the joint's torque RMS; below, what smoothing and imperfect laws leave
+SIGNIFICANT = 0.01
+SEED = 20260
+SLOWEST, FASTEST = 0.3, 8.0  # Hz: oscillators that the competitor with a memory may hold
+OSCILLATORS = 12
+RINGING = 0.1  # their damping ratio
+MOTION_BLOCK = 2.5  # s left out together
+RIDGES = (0.003, 0.03, 0.3, 3.0, 30.0)  # of the features' variance; the best one counts, in the null as well
+TIME_BAND = 1.0  # Hz up to which the competitor of time follows
+TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
+NEARLY = 2.0 / 3.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Unexplained:
+    """What is left at one joint.
+
+    Attributes:
+        joint: Index.
+        share: Part of the remaining residual's variance that is predictable on unseen data.
+        p_value: Share of time-shifted copies that are as predictable.
+        variable: The variables that carry it, in words.
+        rms: Size of the predictable part [N m or N].
+    """
+
+    joint: int
+    share: float
+    p_value: float
+    variable: str
+    rms: float
+
+
+class Competitor(NamedTuple):
+    """Features of some variables at a joint's rows.
+
+    Attributes:
+        variable: The variables in words.
+        features: Shape (R, F), of the order of one.
+        fold: Which rows are left out together, shape (R,).
+        shifts: Whether shifting time breaks what it could rightly predict, so that shifted copies make its null.
+    """
+
+    variable: str
+    features: np.ndarray
+    fold: np.ndarray
+    shifts: bool
+
+
+class Rows(NamedTuple):
+    """The rows of one joint over all recordings that count.
+
+    Attributes:
+        pick: Which rows of each stretch those are.
+        residual: Held-out residual over the level of its recording's noise, shape (R,).
+        level: That level, row by row [N m or N], shape (R,).
+        recording: Shape (R,).
+    """
+
+    pick: list[np.ndarray]
+    residual: np.ndarray
+    level: np.ndarray
+    recording: np.ndarray
+
+    def of(self, arrays: list[np.ndarray]) -> np.ndarray:
+        """The rows of arrays given stretch by stretch."""
+        return np.concatenate([a[p] for a, p in zip(arrays, self.pick, strict=True)])
+
+
+def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
+    """Joints whose residual, findings taken off, can be predicted on unseen data."""
+    out = []
+    torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
+    rmse = proof.rmse(proof.left)
+    for j in range(len(torque)):
+        rows = _rows(ex, proof, j)
+        least = max(MATERIAL_SHARE, (MATERIAL_TORQUE * torque[j] / max(rmse[j], 1e-100)) ** 2)
+        # No share of so small a residual could matter.
+        if len(rows.residual) < 200 or least > 1.0:
+            continue
+        rivals = competitors(ex.data.stretches, j, rows, ex.lib.robot.joint_names)
+        shares = np.array([predicted(c, rows.residual[:, None])[0] for c in rivals])
+        if shares.max() < least:
+            continue
+        null = _null(rivals, rows)
+        # Along a slow sweep position goes with time, and so do copies of the residual shifted in time: where motion is
+        # not beyond chance, what goes with time still is.
+        for best in dict.fromkeys((_carrier(rivals, shares), int(np.argmax(shares)))):
+            share = float(shares[best])
+            p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
+            if share >= least and p <= SIGNIFICANT:
+                size = float(np.sqrt(share) * rmse[j])
+                out.append(Unexplained(j, share, p, rivals[best].variable, size))
+                break
+    return out
+
+
+def _carrier(rivals: list[Competitor], shares: np.ndarray) -> int:
+    """The best competitor; time only where motion does not do nearly as well, for whatever is slow goes with time."""
+    motion = np.where([c.shifts for c in rivals], shares, -np.inf)
+    return int(np.argmax(motion if motion.max() > NEARLY * shares.max() else shares))
+
+
+def competitors(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
+    """All competitors for what is left at joint `j`, weighted like the residual.
+
+    Not that of time: each recording has amplitudes of its own, which weights would make as small as the ridge.
+    """
+    weight = (np.median(rows.level) / rows.level)[:, None]
+    rivals = _unweighted(stretches, j, rows, names)
+    return [c._replace(features=weight * c.features) if c.shifts else c for c in rivals]
+
+
+def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
+    q, qd, qdd, load = (
+        np.stack([_standard(rows.of([getattr(s, name)[:, i] for s in stretches])) for i in range(len(names))], axis=1)
+        for name in ("q", "qd", "qdd", "nominal")
+    )
+    mine = lambda x: x[:, [j]]  # noqa: E731
+    groups = {
+        "position": mine(q),
+        "speed": mine(qd),
+        "position and speed": np.hstack([mine(q), mine(qd)]),
+        "load and speed": np.hstack([mine(load), mine(qd)]),
+        "acceleration": mine(qdd),
+    }
+    fold = _motion_folds(stretches, rows)
+    out = [Competitor(f"the joint's {name}", _features(x), fold, True) for name, x in groups.items()]
+    along = _along_the_range(mine(q), np.sign(rows.of([s.qd[:, [j]] for s in stretches])))
+    out.append(Competitor("the joint's position and its direction of motion", along, fold, True))
+    out.append(Competitor("the joint's own past", _memory(stretches, j, rows), fold, True))
+    for i, name in enumerate(names):
+        if i != j:
+            pairs = [np.hstack([mine(x), x[:, [i]]]) for x in (q, qd)]
+            drive = np.hstack([qdd[:, [i]], load[:, [i]], mine(qd) * qd[:, [i]]])
+            features = np.hstack([*(_features(x) for x in pairs), drive])
+            out.append(Competitor(f"the motion of {name} together with the joint's own", features, fold, True))
+    return [*out, _time(stretches, rows)]
+
+
+def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
+    """Only the level is divided out, not the colour: a slow structure is exactly what is looked for."""
+    pick = [ex.noise.usable(s.use[:, j], j) for s in ex.data.stretches]
+    level = np.concatenate([
+        ex.noise.total[r, j] * spread(s.unsure[p, j], ex.noise.total[r, j])
+        for r, (s, p) in enumerate(zip(ex.data.stretches, pick, strict=True))
+    ])  # fmt: skip
+    recording = np.repeat(np.arange(len(pick)), [p.sum() for p in pick])
+    y = np.concatenate([c[p, j] for c, p in zip(proof.left, pick, strict=True)]) / level
+    if len(y):
+        limit = 6.0 * np.median(np.abs(y)) + 1e-12
+        y = np.clip(y - np.mean(y), -limit, limit)
+    return Rows(pick, y, level, recording)
+
+
+def _motion_folds(stretches: list[Stretch], rows: Rows) -> np.ndarray:
+    """Contiguous stretches of `MOTION_BLOCK`, five folds: far longer than any noise remembers."""
+    t = rows.of([s.t - s.t[0] for s in stretches])
+    return ((t / MOTION_BLOCK).astype(int) + rows.recording) % 5
+
+
+def _standard(x: np.ndarray) -> np.ndarray:
+    return (x - x.mean(axis=0)) / np.maximum(x.std(axis=0), 1e-12)
+
+
+def _features(x: np.ndarray) -> np.ndarray:
+    """Random Fourier features at three scales, the variables and their signs, shape (R, F)."""
+    rng = np.random.default_rng(SEED)
+    omega = rng.normal(size=(x.shape[1], FEATURES)) * rng.choice([0.7, 1.5, 4.0], size=FEATURES)
+    phase = rng.uniform(0, 2 * np.pi, FEATURES)
+    return np.concatenate([np.cos(x @ omega + phase), x, np.sign(x)], axis=1)
+
+
+def _along_the_range(q: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Waves of position, from the whole range down to teeth of a gear, the same in either direction or not, (R, F)."""
+    x = (q - q.min()) / max(float(np.ptp(q)), 1e-12)
+    angle = 2.0 * np.pi * x * np.arange(1, WAVES + 1)
+    waves = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
+    return np.concatenate([waves, direction * waves, direction], axis=1)
+
+
+def _memory(stretches: list[Stretch], j: int, rows: Rows) -> np.ndarray:
+    """Oscillators of many frequencies shaken by the joint's acceleration: positions and speeds, shape (R, F)."""
+    parts = []
+    for s in stretches:
+        dt = float(np.median(np.diff(s.t)))
+        part = []
+        for f in np.geomspace(SLOWEST, min(FASTEST, 0.3 / dt), OSCILLATORS):
+            omega = 2.0 * np.pi * f
+            system = signal.cont2discrete(
+                (np.array([[0, 1], [-(omega**2), -2 * RINGING * omega]]), np.array([[0], [1]]),
+                 np.diag([omega**2, omega]), np.zeros((2, 1))), dt, method="bilinear",
+            )  # fmt: skip
+            part.append(signal.dlsim(system, s.qdd[:, j])[1])
+        parts.append(np.hstack(part))
+    return np.hstack([_standard(rows.of(parts)), _standard(rows.of([s.qdd[:, [j]] for s in stretches]))])
+
+
+def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
+    """Cosines of each recording's own time, up to `TIME_BAND`; short blocks are left out in turn."""
+    features, folds = [], []
+    for r, (s, pick) in enumerate(zip(stretches, rows.pick, strict=True)):
+        length = s.t[-1] - s.t[0]
+        count = max(int(2.0 * TIME_BAND * length), 2)
+        own = np.cos(np.pi * np.outer((s.t[pick] - s.t[0]) / length, np.arange(count)))
+        features.append((r, own))
+        folds.append(((s.t[pick] - s.t[0]) / TIME_BLOCK).astype(int) % 5)
+    width = sum(own.shape[1] for _, own in features)
+    phi, row, column = np.zeros((len(rows.residual), width)), 0, 0
+    for _, own in features:
+        phi[row : row + len(own), column : column + own.shape[1]] = own
+        row, column = row + len(own), column + own.shape[1]
+    return Competitor("time more than on the motion", phi, np.concatenate(folds), False)
+
+
+def predicted(c: Competitor, Y: np.ndarray) -> np.ndarray:
+    """Share of each column's variance that ridge regression on the features predicts on left-out folds."""
+    return 1.0 - _missed(c, Y) / np.maximum(np.sum(Y**2, axis=0), 1e-300)
+
+
+def _missed(c: Competitor, Y: np.ndarray) -> np.ndarray:
+    """Squared error of each column on left-out folds, with the best ridge."""
+    missed = np.zeros((len(RIDGES), Y.shape[1]))
+    whole, cross = c.features.T @ c.features, c.features.T @ Y
+    for f in np.unique(c.fold):
+        test = c.fold == f
+        A = c.features[test]
+        values, vectors = np.linalg.eigh(whole - A.T @ A)
+        seen, projected = A @ vectors, vectors.T @ (cross - A.T @ Y[test])
+        for k, ridge in enumerate(RIDGES):
+            w = projected / (np.maximum(values, 0.0) + ridge * max((~test).sum(), 1))[:, None]
+            missed[k] += np.sum((Y[test] - seen @ w) ** 2, axis=0)
+    return missed.min(axis=0)
+
+
+def _null(rivals: list[Competitor], rows: Rows) -> np.ndarray:
+    """Best share that some competitor predicts of copies of the residual, shifted in time against the motion."""
+    rng = np.random.default_rng(SEED + 1)
+    copies = np.empty((len(rows.residual), SHIFTS))
+    for r in np.unique(rows.recording):
+        at = np.flatnonzero(rows.recording == r)
+        for k in range(SHIFTS):
+            copies[at, k] = np.roll(rows.residual[at], rng.integers(len(at) // 10, max(len(at) - len(at) // 10, 2)))
+    return np.max([predicted(c, copies) for c in rivals if c.shifts], axis=0)
