@@ -54,8 +54,8 @@ def _columns(model: CorrectedModel, case: ConcealedCase) -> tuple[np.ndarray, np
     along = seen_by(better_known(model.robot, model.phi_corrected, model.named), prepared(model.robot, smooth))
     found = columns_along(lib, along, torques.loads)
     one = np.ones(1)
-    effects = [lib.torque(found.effects, np.array([k]), one) for c in lib.candidates for k in c.columns]
-    parts = np.concatenate([found.Y, np.stack([torques.nominal, *effects], axis=-1)], axis=-1)
+    effects = [lib.torque(found, np.array([k]), one) for c in lib.candidates for k in c.columns]
+    parts = np.concatenate([along.regressor_at(slice(None)), np.stack([torques.nominal, *effects], axis=-1)], axis=-1)
     flat = filtered(parts.reshape(len(parts), -1), kernels(model.band.position, model.band.rate)[0])
     size = np.linalg.norm(flat, axis=0)
     return (flat / np.where(size > 0.0, size, 1.0)).reshape(parts.shape), smooth.t

@@ -14,6 +14,7 @@ from irb140_jax.mismatch.regression.rows import Stretch
 
 LAGS = 3  # coefficients of the whitening filter here, the row's own among them
 JOINTS, NUISANCES, AMPLITUDES = 2, 4, 5
+ALL = np.arange(NUISANCES + AMPLITUDES)  # columns
 SETS = ([0], [1, 2], [3], [2, 4], [0, 4], [1])  # amplitudes of some candidates
 WHITE = np.eye(1, ORDER + 1)[0]
 
@@ -30,7 +31,9 @@ def stretches(seed: int, rows: int = 70, recordings: int = 2) -> list[Stretch]:
         use[20:24, 0] = False
         zero = np.zeros((rows, JOINTS))
         t = np.arange(rows) / 50.0
-        out.append(Stretch(r, t, 0.0, X, y, X, y, zero, zero, use, zero, zero, zero, zero, zero))
+        links, held, amplitudes = X[..., :NUISANCES], np.arange(AMPLITUDES), X[..., NUISANCES:]
+        of_log = y, links, y, zero, zero, use, zero, zero, zero, zero, zero
+        out.append(Stretch(r, t, 0.0, AMPLITUDES, links, held, amplitudes, *of_log))
     return out
 
 
@@ -51,7 +54,7 @@ def rows_by_hand(data: list[Stretch], noise: Noise) -> tuple[np.ndarray, np.ndar
             lags = noise.ar[j, :LAGS] / noise.level[r, j]
             for i in range(LAGS - 1, len(s.t)):
                 if s.use[i - LAGS + 1 : i + 1, j].all():
-                    X.append(lags @ s.X[i - LAGS + 1 : i + 1, j][::-1])
+                    X.append(lags @ s.of(ALL, j)[i - LAGS + 1 : i + 1][::-1])
                     y.append(lags @ s.y[i - LAGS + 1 : i + 1, j][::-1])
     return np.array(X), np.array(y)
 
@@ -67,7 +70,7 @@ def log_evidence(X: np.ndarray, y: np.ndarray, scale: np.ndarray) -> float:
 def test_gains_are_differences_of_dense_gaussian_evidence(seed):
     data, noise = stretches(seed), a_noise(seed)
     scale = np.random.default_rng(seed).uniform(0.2, 2.0, NUISANCES + AMPLITUDES)
-    G = grams(data, noise, scale, blocks=4).sum(axis=0)
+    G = grams(data, ALL, noise, scale, blocks=4).sum(axis=0)
     H, _ = eliminated(G, np.arange(NUISANCES))
     X, y = rows_by_hand(data, noise)
     nothing = log_evidence(X[:, :NUISANCES], y, scale[:NUISANCES])
@@ -83,7 +86,7 @@ def test_posterior_is_that_of_dense_bayesian_regression(seed):
     data, noise = stretches(seed), a_noise(seed)
     scale = np.random.default_rng(seed).uniform(0.2, 2.0, NUISANCES + AMPLITUDES)
     columns = np.array([0, 1, 2, 3, 5, 7])
-    post = posterior(grams(data, noise, scale, blocks=3).sum(axis=0), columns)
+    post = posterior(grams(data, ALL, noise, scale, blocks=3).sum(axis=0), columns)
     X, y = rows_by_hand(data, noise)
     X, W = X[:, columns], np.diag(scale[columns])
     S = np.eye(len(y)) + X @ W @ W @ X.T
@@ -135,17 +138,17 @@ def test_eliminating_costs_the_log_determinant_and_nothing_eliminates_nothing():
 
 def test_blocks_add_up_and_those_of_a_recording_are_its_own():
     data, noise, scale = stretches(2), a_noise(2), np.full(NUISANCES + AMPLITUDES, 0.7)
-    blocks = grams(data, noise, scale, blocks=5)
+    blocks = grams(data, ALL, noise, scale, blocks=5)
     X, y = rows_by_hand(data, noise)
     rows = np.concatenate([X * scale, y[:, None]], axis=1)
     np.testing.assert_allclose(blocks.sum(axis=0), rows.T @ rows, atol=1e-9)
-    np.testing.assert_allclose(blocks[:5].sum(axis=0), grams(data[:1], noise, scale, blocks=1)[0], atol=1e-9)
+    np.testing.assert_allclose(blocks[:5].sum(axis=0), grams(data[:1], ALL, noise, scale, blocks=1)[0], atol=1e-9)
 
 
 def test_rows_that_do_not_count_leave_no_trace():
     data, noise, scale = stretches(3), a_noise(3), np.ones(NUISANCES + AMPLITUDES)
     spoiled = [dataclasses.replace(s, y=np.where(s.use, s.y, 1e6)) for s in data]
-    clean, dirty = (grams(x, noise, scale, blocks=4).sum(axis=0) for x in (data, spoiled))
+    clean, dirty = (grams(x, ALL, noise, scale, blocks=4).sum(axis=0) for x in (data, spoiled))
     np.testing.assert_array_equal(clean, dirty)
 
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.columns.along import columns_along, prepared, seen_by
+from irb140_jax.mismatch.columns.along import columns_along, prepared, seen_by, unbounded, without
 from irb140_jax.mismatch.columns.torques import Named, better_known, composed, library_of
 from irb140_jax.mismatch.corrected.model import CorrectedModel
-from irb140_jax.mismatch.regression.rows import stretch
+from irb140_jax.mismatch.regression.rows import Stretch, stretch
 from irb140_jax.mismatch.regression.tangent import point
 from irb140_jax.recordings.condition import choose_band, condition
 from irb140_jax.recordings.recording import Recording
@@ -55,7 +55,7 @@ def settled(model: CorrectedModel):
     along = seen_by(better_known(ROBOT, model.phi_corrected, model.named), prepared(ROBOT, SMOOTH))
     loads = None
     for _ in range(6):  # a gain, and a lag or a delay after it
-        torques = composed(lib, columns_along(lib, along, loads), lib.candidates, amplitudes_of(model), dphi, dphi)
+        torques = composed(lib, along, columns_along(lib, along, loads), amplitudes_of(model), dphi, dphi)
         loads = torques.loads
     return lib, along, torques
 
@@ -79,13 +79,18 @@ def explained():
     return explained_by(lambda _: True)
 
 
+def every_column(rows: Stretch) -> np.ndarray:
+    """Inertials, amplitudes, loose inertials."""
+    return rows.of(np.arange(20 * N + rows.size))
+
+
 def coefficients(dphi: np.ndarray, amplitudes: list[np.ndarray]) -> np.ndarray:
     return np.concatenate([dphi, *amplitudes, np.zeros(10 * N)])
 
 
 def test_at_its_own_point_the_rows_leave_what_the_model_leaves(explained):
     model, dphi, torques, rows = explained
-    left = rows.y - rows.X @ coefficients(dphi, amplitudes_of(model))
+    left = rows.y - every_column(rows) @ coefficients(dphi, amplitudes_of(model))
     np.testing.assert_allclose(left, BAND.apply(SMOOTH.tau - torques.corrected), atol=1e-6)
 
 
@@ -103,7 +108,7 @@ def test_columns_are_slopes_of_the_torque(explained, which):
     change = settled(found_model(moved, amplitudes))[2].corrected - torques.corrected
     step = coefficients(moved, amplitudes) - coefficients(dphi, amplitudes_of(model))
     scale = np.abs(BAND.apply(change)).max()
-    np.testing.assert_allclose(rows.X @ step / scale, BAND.apply(change) / scale, atol=2e-3)
+    np.testing.assert_allclose(every_column(rows) @ step / scale, BAND.apply(change) / scale, atol=2e-3)
 
 
 def test_slopes_rest_on_what_leans_gravity_and_on_laws_of_the_log():
@@ -116,18 +121,20 @@ def test_inertials_alone_are_refitted_to_the_plain_log(explained):
     *_, rows = explained
     lib, along, _ = settled(found_model(np.zeros(10 * N), [0.0 * np.array(w) for _, _, w, _ in FOUND]))
     plain = stretch(lib, along, 0, BAND, np.eye(10 * N))
-    columns = np.concatenate([np.arange(10 * N), plain.X.shape[-1] - np.arange(10, 0, -1)])
-    bare = rows.of_rigid_body(columns)
-    np.testing.assert_allclose(bare.X, plain.X[..., columns])
+    columns = np.concatenate([np.arange(10 * N), 10 * N + plain.size + np.arange(10, 20)])
+    bare = rows.of_rigid_body()
+    np.testing.assert_allclose(bare.of(columns), plain.of(columns))
     np.testing.assert_allclose(bare.y, plain.y)
-    assert not np.allclose(rows.X[..., columns], plain.X[..., columns])
+    assert not np.allclose(rows.of(columns), plain.of(columns))
 
 
 def test_a_spring_that_buckles_under_the_weight_is_no_law_of_this_motion():
     def moved_by(compliance: float, robot) -> np.ndarray:
         spring = Named(CATALOGUE["joint_elasticity"], (1,), (0,), np.ones(1), np.array([compliance]))
         model = CorrectedModel(robot, np.asarray(robot.phi), np.asarray(robot.phi), (spring,), BAND, SMOOTH.rest_speed)
-        return columns_along(library_of(model.robot, model.named), prepared(robot, SMOOTH)).effects
+        lib = library_of(model.robot, model.named)
+        columns = columns_along(lib, prepared(robot, SMOOTH))
+        return without(lib, columns, unbounded(lib, columns))
 
     heavy = eqx.tree_at(lambda r: r.gravity, ROBOT, 20.0 * ROBOT.gravity)
     assert moved_by(1e-5, heavy).any()

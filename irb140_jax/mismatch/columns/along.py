@@ -1,7 +1,7 @@
 """What a robot and every candidate do along a recording: sensitivities and columns."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -22,17 +22,20 @@ from irb140_jax.recordings.turning_points import turned_before, turning_points
 from irb140_jax.robot import Robot, about_origin
 from irb140_jax.types import JointSamples
 
-RUN_IN = 128  # samples in which effects with memory of time forget how their chunk began
+RUN_IN = 512  # samples in which effects with memory forget how their chunk began: the softest spring rings for 2 s
 TURNS = 32  # turning points before a chunk, by which effects with memory of the path know how it began
-CHUNK = 1024 + RUN_IN  # samples per compiled call: recordings of any length reuse one program
+RUN_OUT = 32  # samples ahead that errors of a clock look at
+CHUNK = RUN_IN + 2048 + RUN_OUT  # samples per compiled call: recordings of any length reuse one program
+WINDOW = 4096  # samples whose regressor and sensitivities are held at a time
+KEPT = 50_000  # samples of all recordings, some minutes, up to which both are kept instead of evaluated anew: 250 MB
 # Three directions of gravity without a zero or a one, which would each be a program of its own.
 PULLS = np.array([[2.0, 3.0, 5.0], [5.0, 2.0, 3.0], [3.0, 5.0, 2.0]])  # m/s^2
 
 
 def scales_of(along: Sequence["Prepared"]) -> Scales:
     """Sizes over a set of recordings of a robot."""
-    recordings = [a.recording for a in along]
-    inertia = np.concatenate([np.diagonal(a.rigid.mass, axis1=1, axis2=2) for a in along]).mean(axis=0)
+    recordings, samples = [a.recording for a in along], [len(a.recording.t) for a in along]
+    inertia = np.average([a.inertia for a in along], axis=0, weights=samples)
     return Scales(
         speed=np.max([np.abs(r.qd).max(axis=0) for r in recordings], axis=0),
         rest_speed=np.max([r.rest_speed for r in recordings], axis=0),
@@ -63,58 +66,111 @@ LARGEST = 1e12  # [N m or N] per unit of an amplitude: growth without bound, who
 STEP = 1e-5  # of the differences behind sensitivities [rad, rad/s, m ...]: errors of 1e-9 beside 1e-10 of rounding
 
 
-class Columns(NamedTuple):
-    """What stands beside the logged torque along a recording of T samples.
+@dataclasses.dataclass(frozen=True)
+class Prepared:
+    """A conditioned recording with what the rigid body does along it.
 
     Attributes:
-        Y: Rigid-body regressor, shape (T, n, 10 n).
+        robot: The nominal model.
+        seen: The robot whose slopes shape the effects; see `seen_by`.
+        recording: T samples.
         nominal: Torque of the nominal model [N m or N], shape (T, n).
         motor_side: What of it the links don't feel: rotors and the model's own friction, shape (T, n).
-        effects: Columns of all candidates where they aren't zero throughout, shape (T, entries): see `Library.entries`.
+        inertia: Mean of the mass matrix's diagonal, shape (n,).
+        Y, rigid: Regressor, shape (T, n, 10 n), and sensitivities; None along long recordings, where they are evaluated
+            again whenever they are needed.
     """
 
-    Y: np.ndarray
-    nominal: np.ndarray
-    motor_side: np.ndarray
-    effects: np.ndarray
-
-
-class Prepared(NamedTuple):
-    """A conditioned recording with what the nominal rigid body does along it; the same in every round.
-
-    Attributes:
-        recording: T samples.
-        Y: Regressor, shape (T, n, 10 n).
-        nominal: Torque of the nominal model, shape (T, n).
-        motor_side: What of it the links don't feel, shape (T, n).
-        rigid: Sensitivities, arrays of T samples.
-    """
-
+    robot: Robot
+    seen: Robot
     recording: Conditioned
-    Y: np.ndarray
     nominal: np.ndarray
     motor_side: np.ndarray
-    rigid: RigidBody
+    inertia: np.ndarray
+    Y: np.ndarray | None
+    rigid: RigidBody | None
+
+    def regressor_at(self, at: slice) -> np.ndarray:
+        """Rigid-body regressor of some samples, shape (t, n, 10 n)."""
+        return _regressor(self.robot, self.recording, at) if self.Y is None else self.Y[at]
+
+    def rigid_at(self, at: slice) -> RigidBody:
+        """What effects see of the rigid body at some samples."""
+        if self.rigid is None:
+            return _sensitivities(self.seen, self.recording, at, self.regressor_at(at)[..., -10:])
+        return _each_sample(lambda x: x[at], self.rigid)
+
+    def torque_of(self, dphi: np.ndarray) -> np.ndarray:
+        """Torque of shifts of the inertial parameters, (10 n, k), shape (T, n, k)."""
+        return np.concatenate([self.regressor_at(at) @ dphi for at in windows(len(self.recording.t))])
 
 
-def prepared(robot: Robot, recording: Conditioned) -> Prepared:
-    """Evaluate the rigid body along a recording."""
-    moving = (jnp.asarray(x) for x in (recording.q, recording.qd, recording.qdd))
-    Y = np.asarray(dynamics.regressor_batch(robot, *moving))
+def windows(samples: int) -> list[slice]:
+    """So many samples in windows of `WINDOW`."""
+    return [slice(k, min(k + WINDOW, samples)) for k in range(0, samples, WINDOW)]
+
+
+def prepared(robot: Robot, recording: Conditioned, *, kept: bool = True) -> Prepared:
+    """Evaluate the rigid body along a recording.
+
+    Args:
+        robot: The nominal model.
+        recording: T samples.
+        kept: Whether regressor and sensitivities are held for the next time that they are needed.
+    """
     motor_side = np.asarray(robot.armature) * recording.qdd + _friction(robot, recording)
     spring = np.asarray(robot.stiffness) * (recording.q - np.asarray(robot.springref))
-    nominal = Y @ np.asarray(robot.phi).ravel() + motor_side + spring
-    return Prepared(recording, Y, nominal, motor_side, _sensitivities(robot, recording, Y[..., -10:]))
+    phi, links, bodies, regressors = np.asarray(robot.phi).ravel(), [], [], []
+    inertia = np.zeros(robot.n)
+    for at in windows(len(recording.t)):
+        Y = _regressor(robot, recording, at)
+        rigid = _sensitivities(robot, recording, at, Y[..., -10:])
+        links.append(Y @ phi)
+        inertia += np.diagonal(rigid.mass, axis1=1, axis2=2).sum(axis=0)
+        if kept:
+            regressors.append(Y)
+            bodies.append(rigid)
+    nominal = np.concatenate(links) + motor_side + spring
+    whole = (np.concatenate(regressors), _joined(bodies)) if kept else (None, None)
+    return Prepared(robot, robot, recording, nominal, motor_side, inertia / len(recording.t), *whole)
+
+
+def all_prepared(robot: Robot, recordings: Sequence[Conditioned]) -> list[Prepared]:
+    """The rigid body along recordings; what it takes to keep it is kept where that is not much."""
+    kept = sum(len(r.t) for r in recordings) <= KEPT
+    return [prepared(robot, r, kept=kept) for r in recordings]
 
 
 def seen_by(robot: Robot, along: Prepared) -> Prepared:
     """The same with the sensitivities of a robot that is known better."""
-    return along._replace(rigid=_sensitivities(robot, along.recording, along.Y[..., -10:]))
+    if along.rigid is None:
+        return dataclasses.replace(along, seen=robot)
+    r = along.recording
+    parts = [_sensitivities(robot, r, at, along.regressor_at(at)[..., -10:]) for at in windows(len(r.t))]
+    return dataclasses.replace(along, seen=robot, rigid=_joined(parts))
 
 
-def _sensitivities(robot: Robot, recording: Conditioned, last_link: np.ndarray) -> RigidBody:
+def _regressor(robot: Robot, r: Conditioned, at: slice) -> np.ndarray:
+    return np.asarray(dynamics.regressor_batch(robot, *(jnp.asarray(x[at]) for x in (r.q, r.qd, r.qdd))))
+
+
+PER_SAMPLE = ("by_gravity", "held", "by_q", "by_qd", "mass", "tool", "tool_jacobian")  # of `RigidBody`
+
+
+def _each_sample(change: Callable[..., np.ndarray], *bodies: RigidBody) -> RigidBody:
+    """Sensitivities whose arrays of samples are what a function makes of those of the given ones."""
+    changed = {name: change(*(getattr(b, name) for b in bodies)) for name in PER_SAMPLE}
+    return dataclasses.replace(bodies[0], **changed)
+
+
+def _joined(parts: list[RigidBody]) -> RigidBody:
+    """Sensitivities of successive samples as one."""
+    return _each_sample(lambda *x: np.concatenate(x), *parts)
+
+
+def _sensitivities(robot: Robot, recording: Conditioned, at: slice, last_link: np.ndarray) -> RigidBody:
     """See `RigidBody`.  Springs of the model pull at the link; rotors and friction are the motor's."""
-    q, qd, qdd = recording.q, recording.qd, recording.qdd
+    q, qd, qdd = recording.q[at], recording.qd[at], recording.qdd[at]
     parts = lambda r: (r.armature, r.damping, r.frictionloss)  # noqa: E731
     bare = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 3)
     torque = partial(_torque, bare)
@@ -124,7 +180,7 @@ def _sensitivities(robot: Robot, recording: Conditioned, last_link: np.ndarray) 
     held = torque(q, still, still)
     mass = np.stack([torque(q, still, still + e) - held for e in unit], axis=-1)
     size = np.linalg.norm(np.asarray(robot.gravity))
-    tool, tool_jacobian = _tool(robot, q)
+    tool, tool_jacobian = tool_along(robot, q)
     sides, springs = np.asarray(across(robot.gravity)), np.asarray(robot.stiffness)
     held = last_link @ np.asarray(about_origin(robot.tool_position))
     arrays = (_by_gravity(bare, q), size, sides, held, by_q, by_qd, springs, mass, tool, tool_jacobian)
@@ -142,7 +198,7 @@ def _torque(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.
     return np.asarray(dynamics.inverse_dynamics_batch(robot, *(jnp.asarray(x) for x in (q, qd, qdd))))
 
 
-def _tool(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def tool_along(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Position of the tool in the world, (T, 3), and its velocity per joint speed, (T, n, 3)."""
     both = np.asarray(in_chunks(_tool_of_chunk, robot, (jnp.asarray(q),)))
     return both[:, 0], both[:, 1:]
@@ -154,62 +210,67 @@ def _tool_of_chunk(robot: Robot, q: JointSamples) -> Float[Array, "T n+1 3"]:
     return jax.vmap(lambda x: jnp.concatenate([place(x)[None], velocity(x)]))(q)
 
 
-def columns_along(lib: Library, along: Prepared, loads: Loads | None = None, recording: int = -1) -> Columns:
-    """Rigid-body regressor, nominal torque and all candidate columns along a recording.
+def columns_along(
+    lib: Library, along: Prepared, loads: Loads | None = None, recording: int = -1, at: slice | None = None
+) -> np.ndarray:
+    """Columns of all candidates where they aren't zero throughout, shape (t, entries): see `Library.entries`.
 
     Args:
         lib: The library.
         along: The recording.
         loads: Loads along the recording [N m or N]; the nominal model's where None.
         recording: Its number; below 0 where the diagnosis did not see it.
+        at: The samples, by default all.
     """
     r = along.recording
     nominal = along.nominal
     load, total, carried, scaled = loads or (nominal, nominal, nominal - along.motor_side, nominal)
-    dt = float(np.mean(np.diff(r.t)))
-    near_rest = (r.rest_speed, r.direction)
-    rate = np.gradient(scaled, dt, axis=0)
-    moving = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, rate, along.rigid, *near_rest)
-    which = np.array(float(recording))
-    whole = Motion(*moving, which)  # pyright: ignore[reportArgumentType]: NumPy till compiled
-    per_sample = jax.tree.map(lambda x: np.ndim(x) > 0 and len(x) == len(r.t), whole)
+    rate = np.gradient(scaled, float(np.mean(np.diff(r.t))), axis=0)
+    per_sample = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, rate)
     turns = [turning_points(q) for q in r.q.T]
-    out = np.empty((len(r.t), len(lib.entries[0])))
-    for start in range(0, max(len(r.t) - RUN_IN, 1), CHUNK - RUN_IN):
-        pad = max(start + CHUNK - len(r.t), 0)
-
-        def piece(x, of_time, start=start, pad=pad):
-            if not of_time:
-                return x
-            return np.pad(x[start : start + CHUNK], ((0, pad),) + ((0, 0),) * (x.ndim - 1), mode="edge")
-
-        motion, run_in = jax.tree.map(piece, whole, per_sample), RUN_IN if start else 0
+    first, last = (0, len(r.t)) if at is None else (at.start, at.stop)
+    out = np.empty((last - first, len(lib.entries[0])))
+    for start in range(max(first - RUN_IN, 0), max(last - RUN_IN, 1), CHUNK - RUN_IN - RUN_OUT):
+        piece, pad = slice(start, min(start + CHUNK, len(r.t))), max(start + CHUNK - len(r.t), 0)
+        rigid = _each_sample(lambda x, pad=pad: _padded(x, pad), along.rigid_at(piece))
+        moving = (_padded(x[piece], pad) for x in per_sample)
+        near_rest = r.rest_speed, _padded(r.direction[piece], pad), np.array(float(recording))
+        motion = Motion(*moving, rigid, *near_rest)  # pyright: ignore[reportArgumentType, reportCallIssue]: NumPy
         motion = dataclasses.replace(motion, turned=turned_before(r.q, turns, start, TURNS))
         # One program for each effect: of all in one, XLA would evaluate parts again and again.
         effects = [np.zeros((CHUNK, 0)), *(_columns(b[0], b[1], b[2], motion) for b in lib.blocks)]
-        out[start + run_in : start + CHUNK] = np.concatenate(effects, axis=1)[run_in : CHUNK - pad]
-    return Columns(along.Y, along.nominal, along.motor_side, _bounded(lib, out))
+        begin, end = max(start + RUN_IN if start else 0, first), min(start + CHUNK - RUN_OUT, last)
+        out[begin - first : end - first] = np.concatenate(effects, axis=1)[begin - start : end - start]
+    return out
 
 
-def _bounded(lib: Library, effects: np.ndarray) -> np.ndarray:
-    """The columns, (T, entries), with those of amplitudes zero that are not finite or beyond `LARGEST` at some joint.
+def _padded(x: np.ndarray, pad: int) -> np.ndarray:
+    """Samples with the last one repeated."""
+    return np.pad(x, ((0, pad),) + ((0, 0),) * (x.ndim - 1), mode="edge")
 
-    A spring too soft for the weight on it buckles: along this motion there is no such law, and what moves nothing is
-    never named.
+
+def unbounded(lib: Library, columns: np.ndarray) -> np.ndarray:
+    """Amplitudes whose columns, (t, entries), are not finite or beyond `LARGEST` at some joint.
+
+    A spring too soft for the weight on it buckles: along this motion there is no such law.
     """
     with np.errstate(invalid="ignore"):
-        bad = ~((effects.max(axis=0) < LARGEST) & (effects.min(axis=0) > -LARGEST))
-    if bad.any():
-        amplitudes = lib.entries[1]
-        effects[:, np.isin(amplitudes, amplitudes[bad])] = 0.0
-    return effects
+        bad = ~((columns.max(axis=0) < LARGEST) & (columns.min(axis=0) > -LARGEST))
+    return np.unique(lib.entries[1][bad])
+
+
+def without(lib: Library, columns: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
+    """The columns, with those of some amplitudes zero: what moves nothing is never named."""
+    if len(amplitudes):
+        columns[:, np.isin(lib.entries[1], amplitudes)] = 0.0
+    return columns
 
 
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
-@eqx.filter_jit(compiler_options=QUICK)  # pyright: ignore[reportCallIssue]: passed on to jax.jit, says its docstring
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK)
 def _columns(effect, sites, shapes, motion):
     per_shape = jax.vmap(partial(effect.columns, motion), in_axes=(None, 0))
-    c = jax.vmap(per_shape)(jnp.asarray(sites), jnp.asarray(shapes))  # (S, G, T, m, k)
+    c = jax.vmap(per_shape)(sites, shapes)  # (S, G, T, m, k)
     return jnp.moveaxis(c, 2, 0).reshape(len(motion.t), -1)
 
 

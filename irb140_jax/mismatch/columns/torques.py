@@ -9,7 +9,7 @@ import numpy as np
 
 from irb140_jax.effects import AbstractEffect
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.columns.along import Columns, Loads
+from irb140_jax.mismatch.columns.along import Loads, Prepared, unbounded, without
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
 from irb140_jax.mismatch.inertials.consistent import consistent
 from irb140_jax.robot import Robot, with_phi
@@ -107,8 +107,8 @@ class Torques:
 
 def composed(
     lib: Library,
-    along: Columns,
-    candidates: Sequence[Candidate],
+    along: Prepared,
+    columns: np.ndarray,
     amplitudes: Sequence[np.ndarray],
     dphi_refit: np.ndarray,
     dphi_corrected: np.ndarray,
@@ -116,16 +116,17 @@ def composed(
     """Add up a model's torques along a recording.
 
     Args:
-        lib: The library of the candidates.
-        along: Regressor, nominal torque and columns.
-        candidates: The effects.
-        amplitudes: Amplitudes of each.
+        lib: A library of the model's effects and nothing else.
+        along: The recording.
+        columns: Of the library along it, from `columns_along`.
+        amplitudes: Amplitudes of each effect.
         dphi_refit, dphi_corrected: Shift of the inertial parameters in either model, shape (10 n,).
     """
-    Y, nominal, inside, columns = along
-    load = nominal + Y @ dphi_corrected
+    columns = without(lib, columns, unbounded(lib, columns))
+    shifted = along.torque_of(np.stack([dphi_refit, dphi_corrected], axis=1))
+    load, inside = along.nominal + shifted[..., 1], along.motor_side
     friction, logged = np.zeros_like(load), np.zeros((2, *load.shape))
-    for c, w in zip(candidates, amplitudes, strict=True):
+    for c, w in zip(lib.candidates, amplitudes, strict=True):
         part = lib.torque(columns, c.columns, w)
         if c.effect.logged:
             logged[c.effect.logged - 1] += part
@@ -136,10 +137,11 @@ def composed(
             inside = inside + part if c.effect.transmission else inside
     total = load + friction
     scaled, corrected = total + np.cumsum(logged, axis=0)
-    return Torques(nominal, nominal + Y @ dphi_refit, Loads(load, total, load - inside, scaled), corrected)
+    refit = along.nominal + shifted[..., 0]
+    return Torques(along.nominal, refit, Loads(load, total, load - inside, scaled), corrected)
 
 
-def library_of(robot: Robot, effects: Sequence[Named]) -> Library:
+def library_of(robot: Robot, effects: Sequence[Named] | Sequence[Candidate]) -> Library:
     """A library of nothing but these effects, in their order."""
     blocks, candidates, first = [], [], 0
     for named in effects:

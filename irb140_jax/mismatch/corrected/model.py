@@ -9,7 +9,7 @@ import numpy as np
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.columns.along import columns_along, prepared, seen_by
+from irb140_jax.mismatch.columns.along import all_prepared, columns_along, seen_by
 from irb140_jax.mismatch.columns.loose_inertials import SILENT
 from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, composed, library_of
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
@@ -56,11 +56,12 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     nominal_phi = np.asarray(model.robot.phi)
     shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
     amplitudes = [named.amplitudes for named in model.named]
-    along = seen_by(better_known(model.robot, model.phi_corrected, model.named), prepared(model.robot, recording))
-    torques = composed(lib, columns_along(lib, along), lib.candidates, amplitudes, *shifts)
+    (along,) = all_prepared(model.robot, [recording])
+    along = seen_by(better_known(model.robot, model.phi_corrected, model.named), along)
+    torques = composed(lib, along, columns_along(lib, along), amplitudes, *shifts)
     if model.named:
         # Columns that depend on the load see the corrected one, as they did in the fit.
-        torques = composed(lib, columns_along(lib, along, torques.loads), lib.candidates, amplitudes, *shifts)
+        torques = composed(lib, along, columns_along(lib, along, torques.loads), amplitudes, *shifts)
     if model.discrepancy is None:
         return torques
     rest = model.discrepancy.along(recording, torques.loads.load)

@@ -1,6 +1,5 @@
 """How much a motion would say about what a diagnosis left open, before it is played."""
 
-import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -49,15 +48,14 @@ class Questions:
         along = prepared(self._robot, played(motion, o.scales.rest_speed))
         if np.any(np.abs(along.nominal) > effort_share * np.asarray(self._robot.effort_limit)):
             return None
-        rows = stretch(self._lib, along, 0, o.band, self._factor)
-        theta = rows.X[..., : len(self._factor)]
-        loose = [theta[..., 10 * k : 10 * k + 10] for k in o.loose]
-        X = np.concatenate([theta, *loose, rows.X[..., len(self._factor) + self._order]], axis=-1)
+        rows, inertials = stretch(self._lib, along, 0, o.band, self._factor), np.arange(len(self._factor))
+        loose = [inertials[10 * k : 10 * k + 10] for k in o.loose]
+        columns = np.concatenate([inertials, *loose, len(inertials) + self._order])
         scale = np.concatenate(
             [np.full(len(self._factor), o.uncertainty), np.full(10 * len(o.loose), LOOSE_STD), o.scale]
         )
         noise = Noise(o.ar, o.level[None], o.level[None], np.ones(len(o.ar)))
-        return grams([dataclasses.replace(rows, X=X)], noise, scale, 1)[0, :-1, :-1]
+        return grams([rows], columns, noise, scale, 1)[0, :-1, :-1]
 
     def margin(self, added: np.ndarray, pair: Pair, *, exact: bool = False) -> float:
         """Log odds expected in favour of the true one of two explanations, whichever is true, the worse of the two.

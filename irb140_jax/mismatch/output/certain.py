@@ -26,7 +26,7 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
     """
     c = ex.data.candidates[index]
     columns = ex.data.nuisances + c.columns
-    torque = [s.X[..., columns] @ w for s in ex.data.stretches]
+    torque = [s.of(columns) @ w for s in ex.data.stretches]
     use = [s.use for s in ex.data.stretches]
     power = np.array([sum(np.sum(x[u[:, j], j] ** 2) for x, u in zip(torque, use, strict=True))
                       for j in range(robot.n)])  # fmt: skip
@@ -54,7 +54,7 @@ def _mean_by_direction(
     said = []
     for sign in (1.0, -1.0):
         moving = [
-            s.X[s.use[:, j] & f & (sign * s.qd[:, j] > 0.0), j][:, columns]
+            s.of(columns, j)[s.use[:, j] & f & (sign * s.qd[:, j] > 0.0)]
             for s, f in zip(ex.data.stretches, fast, strict=True)
         ]
         rows = np.concatenate(moving)

@@ -16,7 +16,7 @@ BLOCKS = 5  # contiguous blocks per recording: folds where one recording alone t
 
 @dataclasses.dataclass(frozen=True)
 class Data:
-    """Low-passed rows of all recordings with columns [inertials | amplitudes | loose inertials].
+    """Low-passed rows of all recordings; columns are numbered as in `Stretch`.
 
     Attributes:
         stretches: One per recording.
@@ -31,24 +31,36 @@ class Data:
     nuisances: int
 
 
-def assemble(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data:
-    """Set the prior scale of every column, and leave out joints of which too few rows tell.
+def judged(stretches: list[Stretch]) -> list[Stretch]:
+    """The rows, with none of joints of which too few tell."""
+    tells = sum(s.use.sum(axis=0) for s in stretches) >= FEWEST_ROWS
+    return [dataclasses.replace(s, use=s.use & tells) for s in stretches]
+
+
+def assembled(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data:
+    """Rows that hold the columns of a whole library, those of joints judged, with the prior scale of every column."""
+    joints, amplitudes = lib.entries
+    power = sum(np.einsum("te,te->e", x, x) for x in (s.amplitudes[:, joints, amplitudes] for s in stretches))
+    scale = prior_scale(lib, stretches, uncertainty, np.asarray(power))
+    return Data(judged(stretches), scale, with_loose_inertials(lib), 10 * lib.robot.n)
+
+
+def prior_scale(lib: Library, stretches: list[Stretch], uncertainty: float, power: np.ndarray) -> np.ndarray:
+    """Prior standard deviation of every column's coefficient, shape (K,).
 
     Args:
         lib: The candidates.
         stretches: One per recording.
         uncertainty: Stated relative standard deviation of the inertials.
+        power: Sum of the squares of each column that isn't zero throughout, over all rows, shape (entries,).
     """
     nuisances = 10 * lib.robot.n
-    tells = sum(s.use.sum(axis=0) for s in stretches) >= FEWEST_ROWS
-    out = [dataclasses.replace(s, use=s.use & tells) for s in stretches]
-    rows = sum(len(s.t) for s in out)
-    torque = np.sqrt(sum(np.sum(s.tau**2, axis=0) for s in out) / rows)
-    amplitudes = [s.X[..., nuisances:-nuisances] for s in out]
-    rms = np.sqrt(sum(np.einsum("tjk,tjk->jk", x, x) for x in amplitudes) / rows)
-    with np.errstate(divide="ignore"):
-        seen = rms > ROUNDING * torque[:, None]
-        typical = np.min(np.where(seen, torque[:, None] / np.where(seen, rms, 1), np.inf), axis=0)
+    rows = sum(len(s.t) for s in stretches)
+    torque = np.sqrt(sum(np.sum(s.tau**2, axis=0) for s in stretches) / rows)
+    joints, amplitudes = lib.entries
+    rms, typical = np.sqrt(power / rows), np.full(lib.size, np.inf)
+    seen = rms > ROUNDING * torque[joints]
+    np.minimum.at(typical, amplitudes[seen], torque[joints[seen]] / rms[seen])
     typical[~np.isfinite(typical)] = 0.0
     for effect, sites, shapes, first in lib.blocks:
         width = max(max(v) for v in effect.variants) + 1
@@ -57,10 +69,13 @@ def assemble(lib: Library, stretches: list[Stretch], uncertainty: float) -> Data
         if c.effect.tied:
             moves = typical[c.columns] > 0.0
             typical[c.columns] = np.where(moves, np.min(typical[c.columns], where=moves, initial=np.inf), 0.0)
-    scale = np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
-    loose = LooseInertials()
-    extra = []
+    return np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
+
+
+def with_loose_inertials(lib: Library) -> tuple[Candidate, ...]:
+    """The candidates of a library, and the inertials of each link as one more."""
+    loose, free, out = LooseInertials(), np.full(10, np.inf), list(lib.candidates)
     for k in range(lib.robot.n):
-        columns, free = lib.size + 10 * k + np.arange(10), np.full(10, np.inf)
-        extra.append(Candidate(loose, (k,), np.zeros(0), columns, tuple(range(10)), -free, free))
-    return Data(out, scale, (*lib.candidates, *extra), nuisances)
+        columns = lib.size + 10 * k + np.arange(10)
+        out.append(Candidate(loose, (k,), np.zeros(0), columns, tuple(range(10)), -free, free))
+    return tuple(out)

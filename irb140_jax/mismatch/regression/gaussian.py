@@ -24,11 +24,14 @@ WIDENINGS = 10  # rounds in which the priors of strong effects become as wide as
 ROUNDING = 1e-12  # relative; a log of nonsense can make columns that are equal to a dozen digits
 
 
-def grams(stretches: list[Stretch], noise: Noise, scale: np.ndarray, blocks: int) -> np.ndarray:
+def grams(
+    stretches: list[Stretch], columns: np.ndarray, noise: Noise, scale: np.ndarray, blocks: int
+) -> np.ndarray:
     """Whitened Gram matrices [X | y]'[X | y] of blocks of the data, columns scaled by their prior standard deviation.
 
     Args:
         stretches: One per recording.
+        columns: Which columns X is made of, shape (K,).
         noise: Whitening.
         scale: Prior standard deviation of each column's amplitude, shape (K,).
         blocks: Contiguous blocks per recording.
@@ -36,23 +39,24 @@ def grams(stretches: list[Stretch], noise: Noise, scale: np.ndarray, blocks: int
     Returns:
         Shape (recordings * blocks, K + 1, K + 1).
     """
-    n, size = stretches[0].y.shape[1], stretches[0].X.shape[-1] + 1
+    n, size = stretches[0].y.shape[1], len(columns) + 1
     total = np.zeros((len(stretches) * blocks, size, size))
     # Joints side by side: nearly all of the time is in products, and those hold no lock.
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        for index, own in threads.map(partial(_grams_of_joint, stretches, noise, scale, blocks), range(n)):
+        for index, own in threads.map(partial(_grams_of_joint, stretches, columns, noise, scale, blocks), range(n)):
             total[:, index[:, None], index] += own
     return total
 
 
 def _grams_of_joint(
-    stretches: list[Stretch], noise: Noise, scale: np.ndarray, blocks: int, j: int
+    stretches: list[Stretch], columns: np.ndarray, noise: Noise, scale: np.ndarray, blocks: int, j: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Columns that are not zero throughout and y, and their Gram matrices by block."""
-    active = np.flatnonzero(np.any([np.any(s.X[:, j] != 0.0, axis=0) for s in stretches], axis=0))
+    own = [s.of(columns, j) for s in stretches]
+    active = np.flatnonzero(np.any([np.any(x != 0.0, axis=0) for x in own], axis=0))
     out = []
-    for s in stretches:
-        A = np.concatenate([s.X[:, j][:, active] * scale[active], s.y[:, j : j + 1]], axis=1)
+    for s, x in zip(stretches, own, strict=True):
+        A = np.concatenate([x[:, active] * scale[active], s.y[:, j : j + 1]], axis=1)
         A, usable = noise.whitened(A, j, s.recording, s.unsure[:, j]), noise.usable(s.use[:, j], j)
         # What a law errs by comes back with the motion: played again, it is no more evidence.
         A = A / np.sqrt(s.repeats)
@@ -60,7 +64,7 @@ def _grams_of_joint(
         for block in map(slice, edges[:-1], edges[1:]):
             part = A[block][usable[block]]
             out.append(part.T @ part)
-    return np.append(active, stretches[0].X.shape[-1]), np.stack(out)
+    return np.append(active, len(columns)), np.stack(out)
 
 
 def with_prior(G: np.ndarray) -> np.ndarray:

@@ -7,16 +7,19 @@ effects and y; sums of those over joints are all that a search needs.
 """
 
 import dataclasses
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy import linalg
 
+from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.mismatch.regression.assemble import Data
-from irb140_jax.mismatch.regression.noise import Noise, correlation_time
+from irb140_jax.mismatch.regression.noise import ORDER, Noise, correlation_time
 from irb140_jax.mismatch.regression.nuisances import SCALED, Nuisances
+from irb140_jax.mismatch.regression.rows import Stretch, Window
 
 SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)  # of a block, as a share of the joint's torque
 USUAL = 0.03  # share of the torque that laws are usually wrong by: scale of the half-Cauchy prior
@@ -24,6 +27,7 @@ ONE = 24  # index of the level at which the noise is as it was estimated
 LEVELS = tuple(1.25 ** (k - ONE) for k in range(2 * ONE))  # noise over what was estimated
 REMEMBERED = 192  # settings of a joint that are kept: a quarter of a megabyte each
 
+CandidateRows = Callable[[int], Iterable[tuple[Window, np.ndarray, np.ndarray]]]  # see `candidate_rows`
 Setting = tuple[int, ...]  # indices into SIZES for each block of SCALED, and into LEVELS
 
 START: Setting = (*([3] * len(SCALED)), ONE)
@@ -114,7 +118,7 @@ class JointGram:
         self.lowest = int(np.searchsorted(LEVELS, least * (1.0 - 1e-9)))
         self.keep = np.ones(len(blocks), dtype=bool) if keep is None else keep
         alike = {int(k): (self.keep & (self.repeats == k)).astype(float) for k in np.unique(self.repeats[self.keep])}
-        self._totals = [(k, np.tensordot(w, blocks, 1), float(w @ rows)) for k, w in alike.items()]
+        self._totals = [(k, _sum(blocks, w), float(w @ rows)) for k, w in alike.items()]
         self._once = self._totals[0][1:] if self._totals else (np.zeros(blocks.shape[1:]), 0.0)
         self._kept: dict[tuple[Setting, bool], Integrated] = {}
 
@@ -158,6 +162,10 @@ class JointGram:
             self._kept[key] = self._kept.pop(key)  # most recently used last
         return self._kept[key]
 
+    def forget(self) -> None:
+        """Drop what is kept: hundreds of megabytes, once a search is over."""
+        self._kept.clear()
+
     def _integrated(self, setting: Setting, instrument: bool) -> Integrated:
         level, size, D = LEVELS[setting[-1]], own_scale(self.groups, setting), len(self.groups)
         used = np.flatnonzero((size > 0.0) & (instrument | (self.groups >= 0)))
@@ -171,47 +179,178 @@ class JointGram:
         return Integrated(total, level, used, s, chol, half, constant + log_prior(setting))
 
 
+def _sum(blocks: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Weighted sum of blocks, without a copy of a single one."""
+    return blocks[0] if len(blocks) == 1 and weights[0] == 1.0 else np.tensordot(weights, blocks, 1)
+
+
 def own_scale(groups: np.ndarray, setting: Setting) -> np.ndarray:
     """Prior standard deviation of each own column."""
     sizes = np.array([1.0, *(SIZES[i] for i in setting[:-1])])
     return sizes[groups + 1]
 
 
+@dataclasses.dataclass
+class Sums:
+    """Sums over all rows of products of all columns, of which no more than a window is held at a time.
+
+    Attributes:
+        grams: Of each joint, by how often the motion was repeated: whitened Gram matrix over
+            [own | inertials | common | amplitudes | y], the last three in their own units.
+        rows: Of each joint, by the same: how many rows count.
+        power: Sum of the squares of each column that isn't zero throughout, all rows alike, shape (entries,).
+        lawless: Amplitudes that are of no law along these recordings.
+    """
+
+    grams: list[dict[int, np.ndarray]]
+    rows: list[dict[int, float]]
+    power: np.ndarray
+    lawless: np.ndarray
+
+    @property
+    def finite(self) -> bool:
+        """Whether all sums are numbers."""
+        return all(np.isfinite(G).all() for by in self.grams for G in by.values())
+
+
+def summed(
+    lib: Library, stretches: Sequence[Stretch], rows: Sequence[CandidateRows], extra: Sequence[Nuisances], noise: Noise
+) -> Sums:
+    """Whiten the rows and sum the products of all columns.
+
+    Args:
+        lib: The library.
+        stretches: The rows of each recording, with no column of a candidate.
+        rows: What yields the columns of all candidates along each, given the rows that a window is to overlap by.
+        extra: Nuisance columns of each.
+        noise: Of the rows.
+    """
+    n, joints = lib.robot.n, lib.entries[0]
+    own = [np.flatnonzero(joints == j) for j in range(n)]
+    out = Sums([{} for _ in range(n)], [{} for _ in range(n)], np.zeros(len(joints)), np.zeros(0, dtype=int))
+    # Joints side by side: nearly all of the time is in products, and those hold no lock.
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        for s, e, windows in zip(stretches, extra, rows, strict=True):
+            usable = [noise.usable(s.use[:, j], j) for j in range(n)]
+            for window, columns, lawless in windows(ORDER):
+                fresh = window.new - window.rows.start
+                out.power += np.einsum("te,te->e", columns[fresh:], columns[fresh:])
+                out.lawless = np.union1d(out.lawless, lawless)
+
+                def add(j: int, s=s, e=e, window=window, columns=columns, fresh=fresh, usable=usable) -> None:
+                    at = window.rows
+                    A = np.concatenate([
+                        e.own[j][at], s.inertials[at, j], e.common[at, j], columns[:, own[j]], s.y[at, [j]],
+                    ], axis=1)  # fmt: skip
+                    counts = usable[j][at].copy()
+                    counts[:fresh] = False
+                    A = noise.whitened(A, j, s.recording, s.unsure[at, j])[counts]
+                    _added(out.grams[j], s.repeats, A.T @ A)
+                    _added(out.rows[j], s.repeats, float(len(A)))
+
+                list(threads.map(add, range(n)))
+    out.power[np.isin(lib.entries[1], out.lawless)] = 0.0  # never named
+    return out
+
+
+def _added(sums: dict[int, Any], key: int, more: Any) -> None:
+    sums[key] = sums[key] + more if key in sums else more
+
+
 def joint_grams(
-    data: Data, extra: Sequence[Nuisances], noise: Noise, blocks: int = 1, sensors: np.ndarray | None = None
+    sums: Sums, lib: Library, data: Data, extra: Sequence[Nuisances], noise: Noise, sensors: np.ndarray | None = None
 ) -> tuple[JointGram, ...]:
-    """Whiten the rows and form the Gram matrices of every joint.
+    """Gram matrices of every joint over all candidates.
 
     Shared columns are [inertials | common nuisances | amplitudes | loose inertials], in prior units.
 
     Args:
-        data: Low-passed rows.
+        sums: Over all rows.
+        lib: The library.
+        data: Low-passed rows, with the prior scale of every column.
         extra: Nuisance columns, one per recording.
         noise: Of the rows.
-        blocks: Contiguous blocks per recording.
         sensors: What of the noise the sensors make, shape (n,) [N m or N]; all of it by default.
     """
+    misfit, common = misfits(noise, sensors), extra[0].common.shape[-1]
+    out = []
+    for j, (by_repeats, rows) in enumerate(zip(sums.grams, sums.rows, strict=True)):
+        power = np.sum([np.diagonal(G) for G in by_repeats.values()], axis=0)
+        index, take, scale = _in_prior_units(lib, data.scale, len(extra[0].groups[j]), common, power, j)
+        alike = rows_alike(data, noise, misfit, j)
+        blocks = np.stack([G[np.ix_(take, take)] * (scale[:, None] * scale) / alike for G in by_repeats.values()])
+        count, repeats = np.array([*rows.values()]) / alike, np.array([*rows])
+        out.append(JointGram(index, blocks, extra[0].groups[j], count, repeats, float(misfit[j])))
+    return tuple(out)
+
+
+def _in_prior_units(
+    lib: Library, prior: np.ndarray, own: int, common: int, power: np.ndarray, j: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Numbers of the shared columns that move a joint, y last; where all its columns stand in the sums; their scales.
+
+    Args:
+        lib: The library.
+        prior: Prior standard deviation of every column, shape (K,).
+        own: Number of the joint's own columns.
+        common: Number of nuisance parameters that all joints share.
+        power: Diagonal of the joint's sums.
+        j: The joint.
+    """
+    joints, amplitudes = lib.entries
+    k, mine = 10 * lib.robot.n, amplitudes[joints == j]
+    # Loose inertials have the columns of the inertials: in the sums they stand once.
+    links = own + np.arange(k)
+    stands = np.concatenate([links, own + k + common + np.arange(len(mine)), links])
+    number = np.concatenate([np.arange(k), k + mine, k + lib.size + np.arange(k)])
+    active = (power[stands] > 0.0) & (prior[number] > 0.0)
+    stands, number = stands[active], number[active]
+    first, rest = (number < k), (number >= k)
+    take = np.concatenate([
+        np.arange(own), stands[first], own + k + np.arange(common), stands[rest], [len(power) - 1]
+    ])  # fmt: skip
+    scale = np.concatenate([np.ones(own), prior[number[first]], np.ones(common), prior[number[rest]], [1.0]])
+    index = np.concatenate([number[first], k + np.arange(common), number[rest] + common, [len(prior) + common]])
+    return index, take, scale
+
+
+def misfits(noise: Noise, sensors: np.ndarray | None) -> np.ndarray:
+    """Share of the variance of each joint's noise that the sensors don't make, shape (n,); none by default."""
     total = np.sqrt(np.mean(noise.total**2, axis=0))
-    misfit = np.zeros(len(total)) if sensors is None else 1.0 - np.minimum(sensors / total, 1.0) ** 2
-    form = partial(_joint_gram, data, extra, noise, blocks, misfit)
-    # Joints side by side: nearly all of the time is in products, and those hold no lock.
-    with ThreadPoolExecutor() as threads:
-        return tuple(threads.map(form, range(len(total))))
+    return np.zeros(len(total)) if sensors is None else 1.0 - np.minimum(sensors / total, 1.0) ** 2
 
 
-def _joint_gram(
-    data: Data, extra: Sequence[Nuisances], noise: Noise, blocks: int, misfit: np.ndarray, j: int
+def grams_by_block(
+    data: Data, extra: Sequence[Nuisances], noise: Noise, sensors: np.ndarray, columns: np.ndarray, blocks: int
+) -> tuple[JointGram, ...]:
+    """Gram matrices of every joint over few columns, by block of the data: to leave some out.
+
+    Args:
+        data: Low-passed rows that hold the columns.
+        extra: Nuisance columns, one per recording.
+        noise: Of the rows.
+        sensors: What of the noise the sensors make, shape (n,) [N m or N].
+        columns: Which columns, inertials first.
+        blocks: Contiguous blocks per recording.
+    """
+    return tuple(
+        _gram_by_block(data, extra, noise, misfits(noise, sensors), columns, blocks, j)
+        for j in range(data.stretches[0].y.shape[1])
+    )
+
+
+def _gram_by_block(
+    data: Data, extra: Sequence[Nuisances], noise: Noise, misfit: np.ndarray, columns: np.ndarray, blocks: int, j: int
 ) -> JointGram:
     k, common = data.nuisances, extra[0].common.shape[-1]
-    moves = np.any([np.any(s.X[:, j] != 0.0, axis=0) for s in data.stretches], axis=0)
-    active = np.flatnonzero(moves & (data.scale > 0.0))
-    inertial, amplitude = active[active < k], active[active >= k]
-    index = np.concatenate([inertial, k + np.arange(common), amplitude + common, [len(data.scale) + common]])
+    moves = np.any([np.any(s.of(columns, j) != 0.0, axis=0) for s in data.stretches], axis=0)
+    active = columns[moves & (data.scale[columns] > 0.0)]
+    links, others = active[active < k], active[active >= k]
+    index = np.concatenate([links, k + np.arange(common), others + common, [len(data.scale) + common]])
     out, count, repeats = [], [], []
     for s, e in zip(data.stretches, extra, strict=True):
-        X = s.X[:, j]
         A = np.concatenate([
-            e.own[j], X[:, inertial] * data.scale[inertial], e.common[:, j], X[:, amplitude] * data.scale[amplitude],
+            e.own[j], s.of(links, j) * data.scale[links], e.common[:, j], s.of(others, j) * data.scale[others],
             s.y[:, [j]],
         ], axis=1)  # fmt: skip
         A, usable = noise.whitened(A, j, s.recording, s.unsure[:, j]), noise.usable(s.use[:, j], j)

@@ -1,25 +1,39 @@
-"""Rows of a recording to fit: all columns and the torque they should add up to, both through the low-pass."""
+"""Rows of a recording to fit: columns and the torque they should add up to, both through the low-pass.
+
+Columns of all candidates are made window by window and never held together: what a search needs of them are sums over
+the rows.  Held are those of the inertials, and of the few candidates that an explanation consists of.
+"""
 
 import dataclasses
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from irb140_jax.mismatch.columns.along import Loads, Prepared, columns_along
-from irb140_jax.mismatch.columns.candidates import Library
-from irb140_jax.mismatch.regression.tangent import Point, counted_twice, logged, regressor
+from irb140_jax.mismatch.columns.along import Loads, Prepared, columns_along, tool_along, unbounded, without
+from irb140_jax.mismatch.columns.candidates import Candidate, Library
+from irb140_jax.mismatch.columns.torques import library_of
+from irb140_jax.mismatch.regression.tangent import Point, counted_twice, leaning, logged, regressor
 from irb140_jax.recordings.low_pass import Band
+
+ROWS = 1024  # of a window
+MARGIN = 0.25  # [s] on either side of a window, in which laws of the log look for what they pass on
 
 
 @dataclasses.dataclass(frozen=True)
 class Stretch:
-    """A stretch of one recording, low-passed: for each joint its rows of all columns and of the torque residual.
+    """A stretch of one recording, low-passed: for each joint its rows of columns and of the torque residual.
+
+    Columns are numbered [inertials | amplitudes of the library | loose inertials]; the last are the first again.
 
     Attributes:
         recording: Index of the recording it belongs to.
         t: Time of the rows [s], shape (R,).
         begin: Time at which the recording begins [s].
-        X: Columns [inertials | amplitudes | loose inertials] per joint, (R, n, 10 n + size + 10 n); inertials twice, in
-            units of their prior at relative standard deviation 1.
+        size: Number of amplitudes of the library.
+        inertials: Columns of the inertials in units of their prior at relative standard deviation 1, (R, n, 10 n).
+        held: Numbers of the amplitudes whose columns are held, in order, shape (k,).
+        amplitudes: Those columns, (R, n, k).
         y: What the columns should add up to, (R, n): logged minus nominal torque, and what the last explanation says of
             products of its unknowns; see `tangent`.
         rigid: Columns of the inertials under the model's own gravity and before the log, (R, n, 10 n).
@@ -35,7 +49,10 @@ class Stretch:
     recording: int
     t: np.ndarray
     begin: float
-    X: np.ndarray
+    size: int
+    inertials: np.ndarray
+    held: np.ndarray
+    amplitudes: np.ndarray
     y: np.ndarray
     rigid: np.ndarray
     tau: np.ndarray
@@ -50,18 +67,93 @@ class Stretch:
     motion: int = -1
     repeats: int = 1
 
-    def of_rigid_body(self, columns: np.ndarray) -> "Stretch":
-        """With nothing but these columns, all of inertials, as they are without any explanation."""
-        k = self.rigid.shape[-1]
-        own = np.where(columns < k, columns, columns - (self.X.shape[-1] - k))
-        return dataclasses.replace(self, X=self.rigid[..., own], y=self.tau - self.nominal)
+    def of(self, columns: np.ndarray, joint: int | None = None) -> np.ndarray:
+        """Some columns, (R, n, columns), or those of one joint, (R, columns)."""
+        inertials, amplitudes = (x if joint is None else x[:, joint] for x in (self.inertials, self.amplitudes))
+        k = inertials.shape[-1]
+        columns = np.where(columns < k + self.size, columns, columns - k - self.size)
+        links, out = columns < k, np.empty((*inertials.shape[:-1], len(columns)))
+        out[..., links] = inertials[..., columns[links]]
+        out[..., ~links] = amplitudes[..., np.searchsorted(self.held, columns[~links] - k)]
+        return out
+
+    def of_rigid_body(self) -> "Stretch":
+        """With inertials alone, as they are without any explanation."""
+        return dataclasses.replace(self.holding(), inertials=self.rigid, y=self.tau - self.nominal)
+
+    def holding(self, held: np.ndarray | None = None, amplitudes: np.ndarray | None = None) -> "Stretch":
+        """With the columns of these amplitudes; of none by default."""
+        if held is None or amplitudes is None:
+            held, amplitudes = np.zeros(0, dtype=int), np.zeros((*self.y.shape, 0))
+        return dataclasses.replace(self, held=held, amplitudes=amplitudes)
+
+
+class Window(NamedTuple):
+    """Some rows of a recording.
+
+    Attributes:
+        rows: Which they are, those of the window before included that a filter needs.
+        new: The first that no window before had.
+        samples: What they are made of, with a margin.
+        first: The first sample that the low-pass needs.
+    """
+
+    rows: slice
+    new: int
+    samples: slice
+    first: int
+
+    def low_passed(self, x: np.ndarray, band: Band) -> np.ndarray:
+        """The rows, from what `samples` hold."""
+        begin = self.first - self.samples.start
+        count = (self.rows.stop - self.rows.start - 1) * band.step + len(band.low_pass())
+        return band.apply(x[begin : begin + count])
+
+
+def windows(band: Band, samples: int, margin: int = 0, overlap: int = 0) -> Iterator[Window]:
+    """All rows of a recording of so many samples, some at a time; each but the first with some of those before."""
+    taps, count = len(band.low_pass()), len(band.kept(samples))
+    for new in range(0, count, ROWS):
+        rows = slice(max(new - overlap, 0), min(new + ROWS, count))
+        first, last = rows.start * band.step, (rows.stop - 1) * band.step + taps
+        yield Window(rows, new, slice(max(first - margin, 0), min(last + margin, samples)), first)
+
+
+def candidate_rows(
+    lib: Library, along: Prepared, index: int, band: Band, loads: Loads | None = None, at: Point | None = None,
+    overlap: int = 0,
+) -> Iterator[tuple[Window, np.ndarray, np.ndarray]]:  # fmt: skip
+    """Columns of all candidates through the low-pass, window by window.
+
+    Args:
+        lib: The library.
+        along: The recording.
+        index: Its number.
+        band: Of the comparison.
+        loads: See `columns_along`.
+        at: Of the last explanation, if there is one.
+        overlap: Rows of the window before that come again.
+
+    Returns:
+        The window, the columns that aren't zero throughout, (rows, entries), and amplitudes of no law in it.
+    """
+    recording, dt = along.recording, float(np.mean(np.diff(along.recording.t)))
+    late = at if at and loads and at.log else None
+    margin = int(np.ceil(MARGIN / dt)) if late else 0
+    for window in windows(band, len(recording.t), margin, overlap):
+        columns = columns_along(lib, along, loads, index, window.samples)
+        lawless = unbounded(lib, columns)
+        columns = without(lib, columns, lawless)
+        if late:
+            columns = logged(late, columns, np.where(lib.in_log, -1, lib.entries[0]), dt)
+        yield window, window.low_passed(columns, band), lawless
 
 
 def stretch(
     lib: Library, along: Prepared, index: int, band: Band, factor: np.ndarray, loads: Loads | None = None,
     at: Point | None = None,
 ) -> Stretch:  # fmt: skip
-    """All columns of a recording through the common low-pass, at the kept samples.
+    """Rows of a recording with the columns of a whole library, which should be a small one.
 
     Args:
         lib: The library.
@@ -72,26 +164,79 @@ def stretch(
         loads: See `columns_along`.
         at: Of the last explanation, if there is one.
     """
-    upright, nominal, _, columns = columns_along(lib, along, loads, index)
-    recording, k = along.recording, len(factor)
-    kept = band.kept(len(recording.t))
-    Y, base, twice = upright, nominal, np.zeros_like(nominal)
-    if at and loads and not at.plain:
-        n, dt = lib.robot.n, float(np.mean(np.diff(recording.t)))
-        Y = regressor(at, recording, upright)
-        base = logged(at, nominal - (Y - upright) @ at.dphi, np.arange(n), dt)
-        Y = logged(at, Y.reshape(len(Y), -1), np.repeat(np.arange(n), k), dt).reshape(Y.shape)
-        columns = logged(at, columns, np.where(lib.in_log, -1, lib.entries[0]), dt)
-        twice = counted_twice(at, loads, dt)
-    rigid = band.apply(upright) @ factor
-    X = np.zeros((len(kept), lib.robot.n, k + lib.size + k))
-    X[..., :k] = X[..., -k:] = rigid if Y is upright else band.apply(Y) @ factor
-    lib.spread(band.apply(columns), X[..., k:-k])
-    nominal, tau = band.apply(nominal), band.apply(recording.tau)
-    y = tau - band.apply(base) + band.apply(twice)
+    return with_library(bare_stretch(lib, along, index, band, factor, loads, at), lib, along, band, loads, at)
+
+
+def with_library(
+    bare: Stretch, lib: Library, along: Prepared, band: Band, loads: Loads | None = None, at: Point | None = None
+) -> Stretch:
+    """Rows with the columns of all amplitudes of a library in the place of what they held."""
+    bare = dataclasses.replace(bare, size=lib.size)
+    return bare.holding(np.arange(lib.size), _dense(lib, along, bare.recording, band, loads, at))
+
+
+def with_candidates(
+    bare: Stretch, chosen: Sequence[Candidate], along: Prepared, band: Band, loads: Loads | None, at: Point | None
+) -> Stretch:
+    """Rows with the columns of a few candidates."""
+    few = [c for c in chosen if not c.effect.silent]
+    lib = library_of(along.robot, few)
+    dense = _dense(lib, along, bare.recording, band, loads, at)
+    numbers = np.concatenate([*(c.columns for c in few), np.zeros(0, dtype=int)])
+    places = np.concatenate([*(c.columns for c in lib.candidates), np.zeros(0, dtype=int)])
+    held, first = np.unique(numbers, return_index=True)
+    return bare.holding(held, dense[..., places[first]])
+
+
+def _dense(
+    lib: Library, along: Prepared, index: int, band: Band, loads: Loads | None, at: Point | None
+) -> np.ndarray:
+    """Columns of all amplitudes of a library, shape (R, n, size)."""
+    out = np.zeros((len(band.kept(len(along.recording.t))), lib.robot.n, lib.size))
+    lawless: list[np.ndarray] = [np.zeros(0, dtype=int)]
+    for window, columns, bad in candidate_rows(lib, along, index, band, loads, at):
+        lib.spread(columns, out[window.rows])
+        lawless.append(bad)
+    out[..., np.concatenate(lawless)] = 0.0
+    return out
+
+
+def bare_stretch(
+    lib: Library, along: Prepared, index: int, band: Band, factor: np.ndarray, loads: Loads | None = None,
+    at: Point | None = None,
+) -> Stretch:  # fmt: skip
+    """Rows of a recording without the columns of candidates; see `stretch`."""
+    recording, n = along.recording, lib.robot.n
+    kept, dt = band.kept(len(recording.t)), float(np.mean(np.diff(recording.t)))
+    base, twice = along.nominal, np.zeros_like(along.nominal)
+    explained = at if at and loads and not at.plain else None
+    if explained and loads:
+        base = logged(explained, along.nominal - leaning(explained, along), np.arange(n), dt)
+        twice = counted_twice(explained, loads, dt)
+    rigid, inertials = _inertials(along, band, factor, explained, dt)
+    nominal, tau = band.apply(along.nominal), band.apply(recording.tau)
+    held, none = np.zeros(0, dtype=int), np.zeros((len(kept), n, 0))
     return Stretch(
-        index, recording.t[kept], recording.began, X, y, rigid, tau, nominal, recording.unsure[kept],
+        index, recording.t[kept], recording.began, lib.size, inertials, held, none,
+        tau - band.apply(base) + band.apply(twice), rigid, tau, nominal, recording.unsure[kept],
         recording.usable[kept], recording.q[kept], recording.qd[kept], recording.qdd[kept],
-        np.asarray(along.rigid.tool)[kept], np.asarray(along.rigid.tool_jacobian)[kept], recording.motion,
-        recording.repeats,
+        *tool_along(along.robot, recording.q[kept]), recording.motion, recording.repeats,
     )  # fmt: skip
+
+
+def _inertials(
+    along: Prepared, band: Band, factor: np.ndarray, at: Point | None, dt: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of the inertials as the model has them, and at a point, (R, n, 10 n) each."""
+    n, k = along.nominal.shape[1], len(factor)
+    margin = int(np.ceil(MARGIN / dt)) if at and at.log else 0
+    rigid, found = [], []
+    for window in windows(band, len(along.recording.t), margin):
+        upright = along.regressor_at(window.samples)
+        rigid.append(window.low_passed(upright, band) @ factor)
+        if at:
+            Y = regressor(at, along, window.samples)
+            Y = logged(at, Y.reshape(len(Y), -1), np.repeat(np.arange(n), k), dt).reshape(Y.shape)
+            found.append(window.low_passed(Y, band) @ factor)
+    whole = np.concatenate(rigid)
+    return whole, np.concatenate(found) if at else whole

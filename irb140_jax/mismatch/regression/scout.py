@@ -5,12 +5,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from irb140_jax.effects import AbstractEffect, LeftOver, Scales
-from irb140_jax.mismatch.columns.along import Prepared
+from irb140_jax.mismatch.columns.along import Prepared, without
 from irb140_jax.mismatch.columns.candidates import Library, library, reshaped
-from irb140_jax.mismatch.regression.assemble import Data, assemble
+from irb140_jax.mismatch.regression.assemble import Data, assembled
 from irb140_jax.mismatch.regression.gaussian import layouts
 from irb140_jax.mismatch.regression.noise import spread
-from irb140_jax.mismatch.regression.rows import Stretch, stretch
+from irb140_jax.mismatch.regression.rows import Stretch, candidate_rows, stretch
 from irb140_jax.recordings.low_pass import Band
 
 THIN = 2  # every second of them in a scan; the search then sees all rows
@@ -29,7 +29,7 @@ def scouted(
     ordinary = [e for e in effects if e.ordinary]
     beside = [e for e in effects if any(e.slug in o.beside for o in effects)]
     plain = library(lib.robot, ordinary + beside, scales)
-    data = assemble(plain, [stretch(plain, r, i, band, factor) for i, r in enumerate(along)], uncertainty)
+    data = assembled(plain, [stretch(plain, r, i, band, factor) for i, r in enumerate(along)], uncertainty)
     columns = np.arange(data.nuisances + library(lib.robot, ordinary, scales).size)
     noise = np.array([[_rms(s.y[s.use[:, j], j]) for j in range(lib.robot.n)] for s in data.stretches])
     for _ in range(2):  # the first noise holds what friction explains
@@ -39,7 +39,7 @@ def scouted(
         noise = noise * np.array(size)
     left = left_over(data, columns, noise)
     free = np.arange(data.nuisances + plain.size)
-    best = _scanned(lib, along, band, factor, scales, left_over(data, free, noise))
+    best = _scanned(lib, along, band, scales, left_over(data, free, noise))
     shapes = [
         np.stack([
             e.around(best[e.slug, tuple(joints)]) if (e.slug, tuple(joints)) in best
@@ -51,13 +51,12 @@ def scouted(
 
 
 def _scanned(
-    lib: Library, along: Sequence[Prepared], band: Band, factor: np.ndarray, scales: Scales, left: LeftOver
+    lib: Library, along: Sequence[Prepared], band: Band, scales: Scales, left: LeftOver
 ) -> dict[tuple[str, tuple[int, ...]], np.ndarray]:
     """The best shape of each effect that has a scan, by effect and site."""
     scanning = [e for e, sites, *_ in lib.blocks if len(e.scan(scales, sites[0]))]
     many = library(lib.robot, scanning, scales, scan=True)
-    rows = [stretch(many, r, i, band, factor) for i, r in enumerate(along)]
-    X = _thinned(rows, lambda s: s.X[..., len(factor) : -len(factor)])[::THIN]
+    X = _thin_columns(many, along, band)
     left = left.every(THIN)
     best: dict[tuple[str, tuple[int, ...]], tuple[float, np.ndarray]] = {}
     for group in layouts(many.candidates, 0):
@@ -71,10 +70,28 @@ def _scanned(
     return {key: shape for key, (_, shape) in best.items()}
 
 
+def _thin_columns(lib: Library, along: Sequence[Prepared], band: Band) -> np.ndarray:
+    """Columns of a library at the rows that a scan looks at, shape (rows, n, size)."""
+    every, thin, lawless = [], _thin([len(band.kept(len(a.recording.t))) for a in along]), [np.zeros(0, dtype=int)]
+    for i, a in enumerate(along):
+        for window, columns, bad in candidate_rows(lib, a, i, band):
+            every.append(columns[-window.new % thin :: thin].copy())  # a view would keep the whole window
+            lawless.append(bad)
+    columns = without(lib, np.concatenate(every)[::THIN], np.concatenate(lawless))
+    out = np.zeros((len(columns), lib.robot.n, lib.size))
+    lib.spread(columns, out)
+    return out
+
+
 def _thinned(stretches: Sequence[Stretch], part: Callable[[Stretch], np.ndarray]) -> np.ndarray:
     """An array of all recordings' rows, thinned to what scouts need."""
-    thin = max(1, sum(len(s.t) for s in stretches) // MOST_ROWS)
+    thin = _thin([len(s.t) for s in stretches])
     return np.concatenate([part(s)[::thin] for s in stretches])
+
+
+def _thin(rows: Sequence[int]) -> int:
+    """Every how many rows of recordings of so many scouts look at one."""
+    return max(1, sum(rows) // MOST_ROWS)
 
 
 def suggested(
@@ -98,7 +115,7 @@ def left_over(data: Data, columns: np.ndarray, noise: np.ndarray) -> LeftOver:
     t = _thinned(data.stretches, lambda s: s.t - s.begin)
     level = np.maximum(noise, 1e-9)[recording]
     weight = np.where(join("use"), 1.0 / (level * spread(join("unsure"), level)), 0.0)
-    X = _thinned(data.stretches, lambda s: s.X[..., columns]) * data.scale[columns]
+    X = _thinned(data.stretches, lambda s: s.of(columns)) * data.scale[columns]
     return LeftOver(
         recording, t, join("q"), join("tool"), join("tool_jacobian"), weight, join("y") * weight, X * weight[..., None]
     )

@@ -15,9 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax import dynamics
-from irb140_jax.mismatch.columns.along import Loads
+from irb140_jax.mismatch.columns.along import Loads, Prepared, windows
 from irb140_jax.mismatch.columns.torques import Named, as_named
-from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.robot import Robot
 
 AT_ONCE = 256  # columns whose rates are held at a time
@@ -58,12 +57,21 @@ def point(robot: Robot, dphi: np.ndarray, named: Sequence[Named]) -> Point:
     return Point(leaning, dphi, tuple(log), frozenset((n.effect.slug, n.joints) for n in (*lean, *log)))
 
 
-def regressor(at: Point, recording: Conditioned, upright: np.ndarray) -> np.ndarray:
-    """Rigid-body regressor under the gravity found, shape (T, n, 10 n); `upright` is that of the model."""
+def regressor(at: Point, along: Prepared, samples: slice) -> np.ndarray:
+    """Rigid-body regressor of some samples under the gravity found, shape (t, n, 10 n)."""
     if at.leaning is None:
-        return upright
-    moving = (jnp.asarray(x) for x in (recording.q, recording.qd, recording.qdd))
+        return along.regressor_at(samples)
+    r = along.recording
+    moving = (jnp.asarray(x[samples]) for x in (r.q, r.qd, r.qdd))
     return np.asarray(dynamics.regressor_batch(at.leaning, *moving))
+
+
+def leaning(at: Point, along: Prepared) -> np.ndarray:
+    """Torque of the shifted inertials by what gravity found differs from the model's, shape (T, n)."""
+    if at.leaning is None:
+        return np.zeros_like(along.nominal)
+    parts = [(regressor(at, along, s) - along.regressor_at(s)) @ at.dphi for s in windows(len(along.recording.t))]
+    return np.concatenate(parts)
 
 
 def logged(at: Point, x: np.ndarray, joints: np.ndarray, dt: float) -> np.ndarray:

@@ -2,20 +2,36 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from irb140_jax.effects import AbstractEffect
-from irb140_jax.mismatch.columns.along import Loads, Prepared, columns_along, prepared, scales_of, seen_by
+from irb140_jax.mismatch.columns.along import Loads, Prepared, all_prepared, columns_along, scales_of, seen_by
 from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, composed, library_of
 from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
-from irb140_jax.mismatch.regression.assemble import BLOCKS, assemble
+from irb140_jax.mismatch.regression.assemble import (
+    BLOCKS,
+    Data,
+    assembled,
+    judged,
+    prior_scale,
+    with_loose_inertials,
+)
+from irb140_jax.mismatch.regression.gram import grams_by_block, joint_grams, summed
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import nuisances
-from irb140_jax.mismatch.regression.rows import stretch
+from irb140_jax.mismatch.regression.nuisances import Nuisances, nuisances
+from irb140_jax.mismatch.regression.rows import (
+    Stretch,
+    bare_stretch,
+    candidate_rows,
+    with_candidates,
+    with_library,
+)
 from irb140_jax.mismatch.regression.scout import left_over, scouted, suggested
 from irb140_jax.mismatch.regression.tangent import Point, point
+from irb140_jax.mismatch.selection.averages import site_of
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted, parts
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
@@ -50,7 +66,7 @@ def explain(
     """
     factor = inertial_prior_factor(robot, 1.0)
     progress("rigid body along the recordings")
-    along = [prepared(robot, r) for r in recordings]
+    along = all_prepared(robot, recordings)
     scales = scales_of(along)
     lib = first = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     loads: list[Loads | None] = [None] * len(recordings)
@@ -58,33 +74,39 @@ def explain(
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
 
-    def explained(turn: int, blocks: int) -> Explanation:
-        ex = explained_at(at, turn, blocks)
-        if at and not at.rests_on <= {(m.slug, m.joints) for m in ex.members}:
-            # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
-            del ex
-            return explained_at(None, turn, blocks)
-        return ex
-
-    def explained_at(at: Point | None, turn: int, blocks: int) -> Explanation:
+    def explained(at: Point | None, turn: int, *, last: bool = False) -> Explanation:
         progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
-        both = zip(along, loads, strict=True)
-        rows = [stretch(lib, r, i, band, factor, load, at) for i, (r, load) in enumerate(both)]
-        if at and not all(np.isfinite(r.y).all() and np.isfinite(r.X).all() for r in rows):
-            return explained_at(None, turn, blocks)  # an explanation without bounds is nothing to start from
-        data = assemble(lib, rows, uncertainty)
-        progress(f"searching sets of explanations (round {turn})")
-        known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in zip(along, loads, strict=True)]
+        each = [*zip(along, loads, strict=True)]
+        rows = judged([bare_stretch(lib, r, i, band, factor, load, at) for i, (r, load) in enumerate(each)])
+        known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in each]
         extra = nuisances(robot, along, known, band, scales)
-        whitening = noise or flexible_noise(data, extra)
-        space = space_of(data, extra, whitening, lib, first, sensors, blocks, settled=turn > 1)
+        whitening = noise or _first_noise(lib, rows, along, band, uncertainty, extra)
+        columns = [partial(candidate_rows, lib, r, i, band, load, at) for i, (r, load) in enumerate(each)]
+        sums = summed(lib, rows, columns, extra, whitening)
+        if at and not sums.finite:
+            return explained(None, turn, last=last)  # an explanation without bounds is nothing to start from
+        data = Data(rows, prior_scale(lib, rows, uncertainty, sums.power), with_loose_inertials(lib), len(factor))
+        progress(f"searching sets of explanations (round {turn})")
+        joints = joint_grams(sums, lib, data, extra, whitening, sensors)
+        del sums  # hundreds of megabytes, before the search
+        space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
         # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
-        best, settings, sets = selected(space, chosen, every_move=turn == 1 or blocks > 1)
-        return Explanation(lib, scales, data, extra, whitening, space, best, settings, sets, factor)
+        best, settings, sets = selected(space, chosen, every_move=turn == 1 or last)
+        if at and not at.rests_on <= {site_of(data.candidates[i]) for i in best}:
+            # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
+            return explained(None, turn, last=last)
+        best, settings = named(space, best, settings, sets) if last else (best, settings)
+        for joint in joints:
+            joint.forget()
+        members = [data.candidates[i] for i in best]
+        held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
+        data = dataclasses.replace(data, stretches=held)
+        ex = Explanation(lib, scales, data, extra, whitening, space, space, best, settings, sets, factor)
+        return _by_block(ex, sensors) if last else ex
 
     turn, coarse, off = 1, False, False
     while turn < PASSES or ((coarse or off) and turn < MOST_PASSES):
-        ex = explained(turn, blocks=1)
+        ex = explained(at, turn)
         found = fitted(ex.data, ex.posterior(), ex.chosen, factor)
         physics = _physics(found)
         better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
@@ -98,9 +120,23 @@ def explain(
         lib, chosen = _refined(_without_discrepancy(ex) if turn == 1 or coarse else ex)
         turn += 1
         del ex  # hundreds of megabytes, before the next
-    ex = explained(turn, BLOCKS)
-    sure, settings = named(ex.space, ex.chosen, ex.settings, ex.sets)
-    return dataclasses.replace(ex, chosen=sure, settings=settings)
+    return explained(at, turn, last=True)
+
+
+def _first_noise(
+    lib: Library, rows: Sequence[Stretch], along: Sequence[Prepared], band: Band, uncertainty: float,
+    extra: Sequence[Nuisances],
+) -> Noise:  # fmt: skip
+    """Noise before anything is explained: what ordinary friction and a free discrepancy leave."""
+    usual = library_of(lib.robot, [c for c in lib.candidates if c.effect.ordinary])
+    held = [with_library(s, usual, r, band) for s, r in zip(rows, along, strict=True)]
+    return flexible_noise(assembled(usual, held, uncertainty), extra)
+
+
+def _by_block(ex: Explanation, sensors: np.ndarray) -> Explanation:
+    """The explanation with Gram matrices of what it names by block of the data, to leave some out."""
+    joints = grams_by_block(ex.data, ex.extra, ex.noise, sensors, ex.columns(), BLOCKS)
+    return dataclasses.replace(ex, by_block=dataclasses.replace(ex.space, joints=joints))
 
 
 def _physics(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
@@ -113,7 +149,7 @@ def _torques(robot: Robot, physics: Sequence[Named], dphi: np.ndarray, r: Prepar
     """Torques of effects and of shifted inertial parameters (10 n,) along a recording."""
     lib = library_of(robot, physics)
     columns = columns_along(lib, r, recording=index)
-    return composed(lib, columns, lib.candidates, [named.amplitudes for named in physics], dphi, dphi)
+    return composed(lib, r, columns, [named.amplitudes for named in physics], dphi, dphi)
 
 
 def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
@@ -128,7 +164,7 @@ def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
     w = post.mean * ex.data.scale[post.columns]
     square = np.zeros(len(ex.settings))
     for s, t in zip(ex.data.stretches, torques, strict=True):
-        linear = s.tau - s.y + s.X[..., post.columns] @ w
+        linear = s.tau - s.y + s.of(post.columns) @ w
         square += np.sum(np.where(s.use, band.apply(t.corrected) - linear, 0.0) ** 2, axis=0)
     rows = np.maximum(sum(s.use.sum(axis=0) for s in ex.data.stretches), 1)
     return bool(np.any(np.sqrt(square / rows) > ex.level))

@@ -27,7 +27,8 @@ class Explanation:
         data: Low-passed rows.
         extra: Nuisance columns and the discrepancy's, one per recording.
         noise: What whitens the rows.
-        space: Gram matrices and priors.
+        space: Gram matrices of all candidates, and priors.
+        by_block: The same of what is named alone, by block of the data, once the search is over.
         chosen: Indices of the candidates that are named.
         settings: Sizes of the discrepancy and noise levels of each joint beside them.
         sets: Log posterior of every set that the search visited.
@@ -41,6 +42,7 @@ class Explanation:
     extra: list[Nuisances]
     noise: Noise
     space: Space
+    by_block: Space
     chosen: tuple[int, ...]
     settings: Settings
     sets: Sets
@@ -103,7 +105,7 @@ class Explanation:
                 right but for what is named.
         """
         chosen = self.chosen if chosen is None else chosen
-        space = self.space if without is None else self.space.without(without)
+        space = self.space if without is None else self.by_block.without(without)
         mean, cov = space.posterior(chosen, self.settings, instrument=instrument, scaled=self.scaled)
         keep = np.r_[0 : self.space.inertials, self.space.offset : len(mean)]
         return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
@@ -120,7 +122,7 @@ class Explanation:
         Args:
             without: Which blocks of the data are left out, shape (blocks,).
         """
-        space = self.space if without is None else self.space.without(without)
+        space = self.space if without is None else self.by_block.without(without)
         mean, cov = space.posterior(self.chosen, self.settings, instrument=False, scaled=self.scaled)
         mean = self.of_bodies(mean, cov, self.chosen, space.offset)
         columns = space.set_columns(self.chosen)
@@ -135,7 +137,7 @@ class Explanation:
         Args:
             without: Which blocks of the data are left out, shape (blocks,).
         """
-        space = self.space.without(without)
+        space = self.by_block.without(without)
         mean, _ = space.posterior(self.chosen, self.settings)
         columns, keep = space.set_columns(self.chosen), np.r_[0 : space.inertials, space.offset : len(mean)]
         own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(self.settings)]

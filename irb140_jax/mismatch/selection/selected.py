@@ -71,10 +71,10 @@ def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:
     shared = np.concatenate([np.arange(data.nuisances), *usual])
     residuals, dof = [np.zeros_like(s.y) for s in data.stretches], np.zeros(n)
     for j in range(n):
-        keep = shared[np.any([np.any(s.X[:, j, shared] != 0.0, axis=0) for s in data.stretches], axis=0)]
+        keep = shared[np.any([np.any(s.of(shared, j) != 0.0, axis=0) for s in data.stretches], axis=0)]
         size = np.concatenate([data.scale[keep], own_scale(extra[0].groups[j], FREE)])
         columns = [
-            np.concatenate([s.X[:, j][:, keep], e.own[j]], axis=1) * size
+            np.concatenate([s.of(keep, j), e.own[j]], axis=1) * size
             for s, e in zip(data.stretches, extra, strict=True)
         ]
         A = np.concatenate([x[s.use[:, j]] for x, s in zip(columns, data.stretches, strict=True)])
@@ -108,7 +108,7 @@ def noise_left(
     own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(settings)]
     residuals = []
     for s, e in zip(data.stretches, extra, strict=True):
-        r = s.y - s.X[..., at] @ w - e.common @ common
+        r = s.y - s.of(at) @ w - e.common @ common
         residuals.append(r - np.stack([x @ v for x, v in zip(e.own, own, strict=True)], axis=1))
     known = np.diag(cov) / space.prior(chosen, settings) ** 2
     shared = (len(mean) - float(known.sum())) / n  # shrunk ones count for less; they are split over the joints

@@ -1,14 +1,11 @@
-"""From low-passed rows to the space that a search visits: priors and bounds of every candidate, Gram matrices."""
+"""The space that a search visits: priors and bounds of every candidate, beside the Gram matrices."""
 
-from collections.abc import Sequence
 
 import numpy as np
 
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
 from irb140_jax.mismatch.regression.assemble import Data
-from irb140_jax.mismatch.regression.gram import joint_grams
-from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import Nuisances
+from irb140_jax.mismatch.regression.gram import JointGram
 from irb140_jax.mismatch.selection.evidence import Space
 from irb140_jax.mismatch.selection.kinds import kinds_of
 
@@ -18,22 +15,19 @@ EVENT = 0.2  # s before what happens once, or after it, that must be recorded
 
 
 def space_of(
-    data: Data, extra: Sequence[Nuisances], noise: Noise, lib: Library, first: Library, sensors: np.ndarray,
-    blocks: int = 1, *, settled: bool = True,
-) -> Space:  # fmt: skip
-    """Gram matrices of the rows, with the prior probability of every candidate.
+    joints: tuple[JointGram, ...], data: Data, common: int, lib: Library, first: Library, *, settled: bool = True
+) -> Space:
+    """Gram matrices of every joint, with the prior probability and the bounds of every candidate.
 
     Args:
+        joints: Gram matrices of every joint.
         data: Low-passed rows and candidates.
-        extra: Nuisance columns of each recording.
-        noise: Of the rows.
+        common: Number of nuisance parameters that all joints share.
         lib: The library.
         first: The library before its shapes were refined: what was to be expected of them.
-        sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
-        blocks: Contiguous blocks per recording.
         settled: Whether the grids of shapes have been refined.
     """
-    common, candidates = extra[0].common.shape[-1], data.candidates
+    candidates = data.candidates
     width = max(len(c.columns) for c in candidates)
     lowest, highest = np.full((2, len(candidates), width), -np.inf)
     highest[:] = np.inf
@@ -54,9 +48,8 @@ def space_of(
         if c.effect.adds_up:
             weights[i, :k], least[i] = s, c.lowest[0]
     return Space(
-        joint_grams(data, extra, noise, blocks, sensors), candidates, data.nuisances, data.nuisances + common,
-        len(data.scale) + common, log_prior(data, lib, first), kinds_of(candidates, RARE), lowest, highest, weights,
-        least,
+        joints, candidates, data.nuisances, data.nuisances + common, len(data.scale) + common,
+        log_prior(data, lib, first), kinds_of(candidates, RARE), lowest, highest, weights, least,
     )  # fmt: skip
 
 

@@ -80,7 +80,7 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     block, too: without it nothing is known there, and a wall that is touched once would drown all else.
     """
     recording = recordings_of_blocks(ex)
-    out, weight = [], np.vstack([np.stack([g.rows for g in ex.space.joints]), _energy(ex, ex.chosen)])
+    out, weight = [], np.vstack([np.stack([g.rows for g in ex.by_block.joints]), _energy(ex, ex.chosen)])
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
     of_recording = np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches])
     motion, number = of_recording[recording], np.tile(np.arange(BLOCKS), len(ex.data.stretches))
@@ -98,7 +98,7 @@ def recordings_of_blocks(ex: Explanation) -> np.ndarray:
 
 def _energy(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:
     """Squared whitened torque of each member of a set in each block, shape (members, blocks)."""
-    mean, space = ex.posterior(chosen, instrument=False).mean, ex.space
+    mean, space = ex.posterior(chosen, instrument=False).mean, ex.by_block
     out = np.zeros((len(chosen), len(space.joints[0].blocks)))
     for k, (c, part) in enumerate(zip(chosen, parts(ex.data, chosen), strict=True)):
         for g, place in zip(space.joints, space.places, strict=True):
@@ -142,19 +142,21 @@ def refitted(ex: Explanation) -> Refit:
     """Refit the inertials beside an explanation."""
     loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
     columns = ex.columns(loose)
-    stretches = [s.of_rigid_body(columns) for s in ex.data.stretches]
+    stretches = [s.of_rigid_body() for s in ex.data.stretches]
     scale, prior = ex.data.scale[columns], np.ones(len(columns))
     prior[: ex.data.nuisances] = ex.space.width(ex.chosen, ex.settings)
-    noise = _noise_left(stretches, scale, prior, ex.noise)
-    return Refit(ex, loose, grams(stretches, noise, scale, BLOCKS), prior)
+    noise = _noise_left(stretches, columns, scale, prior, ex.noise)
+    return Refit(ex, loose, grams(stretches, columns, noise, scale, BLOCKS), prior)
 
 
-def _noise_left(stretches: list[Stretch], scale: np.ndarray, prior: np.ndarray, noise: Noise) -> Noise:
+def _noise_left(
+    stretches: list[Stretch], columns: np.ndarray, scale: np.ndarray, prior: np.ndarray, noise: Noise
+) -> Noise:
     """Noise that columns leave, fitted under noise that was guessed before, and again under what they leave."""
     every, n = np.arange(len(scale)), stretches[0].y.shape[1]
     for _ in range(SETTLED):
-        post = posterior(grams(stretches, noise, scale, 1).sum(axis=0), every, prior=prior)
-        residuals = [s.y - s.X @ (post.mean * scale) for s in stretches]
+        post = posterior(grams(stretches, columns, noise, scale, 1).sum(axis=0), every, prior=prior)
+        residuals = [s.y - s.of(columns) @ (post.mean * scale) for s in stretches]
         # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
         dof = np.full(n, (len(scale) - float(np.sum(np.diag(post.cov) / prior**2))) / n)
         noise = noise_from_residuals(residuals, [s.use for s in stretches], dof, [s.unsure for s in stretches])
@@ -165,7 +167,7 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     """Residuals of the rival models, each row predicted from the other motions (or blocks)."""
     data, energy, recording = ex.data, _energy(ex, ex.chosen), recordings_of_blocks(ex)
     seen = ex.posterior(instrument=False).mean
-    bare = [s.of_rigid_body(refit.columns) for s in data.stretches]
+    bare = [s.of_rigid_body() for s in data.stretches]
     out = {"refit": [s.y.copy() for s in bare], "named": [s.y.copy() for s in data.stretches]}
     out["flexible"], out["left"] = ([s.y.copy() for s in data.stretches] for _ in range(2))
     gains, fits = {"flexible": np.zeros(len(ex.settings)), "left": np.zeros(len(ex.settings))}, []
@@ -179,13 +181,16 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
         erring = np.where(_only_here(ex, ex.chosen, energy, fold), seen, erring) * data.scale[post.columns]
         for r, s in enumerate(data.stretches):
             mine = fold[recording == s.recording]
+            if not mine.any():
+                continue
+            named, rigid = s.of(post.columns), bare[r].of(refit.columns)
             edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
             for b in np.flatnonzero(mine):
                 rows = slice(edges[b], edges[b + 1])
-                out["refit"][r][rows] -= bare[r].X[rows] @ inertial
-                out["named"][r][rows] -= s.X[rows][..., post.columns] @ corrected
+                out["refit"][r][rows] -= rigid[rows] @ inertial
+                out["named"][r][rows] -= named[rows] @ corrected
                 out["named"][r][rows] -= scale / GAIN_COMMON * ex.extra[r].common[rows, :, 0]
-                out["left"][r][rows] -= s.X[rows][..., post.columns] @ erring + ex.extra[r].common[rows] @ common
+                out["left"][r][rows] -= named[rows] @ erring + ex.extra[r].common[rows] @ common
                 out["left"][r][rows] -= np.stack(
                     [x[rows] @ v for x, v in zip(ex.extra[r].own, errors, strict=True)], axis=1
                 )
@@ -214,7 +219,7 @@ def held_out_gains(ex: Explanation) -> dict[int, float]:
 
 def _unseen_error(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> float:
     """Whitened squared error of a set on data that its fit did not see."""
-    space, error, energy = ex.space, 0.0, _energy(ex, chosen)
+    space, error, energy = ex.by_block, 0.0, _energy(ex, chosen)
     columns = space.with_y(space.set_columns(chosen))
     seen = ex.posterior(chosen, instrument=False).mean
     for fold in left_out:

@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from irb140_jax.effects import AbstractEffect, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.columns.along import columns_along, prepared
+from irb140_jax.mismatch.columns.along import columns_along, prepared, unbounded, without
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.mismatch.regression.gaussian import eliminated
 from irb140_jax.mismatch.selection.explanation import Explanation
@@ -69,7 +69,9 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
     """
     robot = within(lib.robot, scales.low, scales.high)
     motion = played(fourier_motion(robot, rate=rate, **LIVELY), scales.rest_speed)
-    along = columns_along(lib, prepared(lib.robot, motion))
+    along = prepared(lib.robot, motion)
+    effects = columns_along(lib, along)
+    effects = without(lib, effects, unbounded(lib, effects))
     torque, amplitudes = np.sqrt(np.mean(along.nominal**2, axis=0)), np.zeros(lib.size)
     for effect, sites, shapes, first in lib.blocks:
         width = max(max(v) for v in effect.variants) + 1
@@ -80,7 +82,7 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
             joints = slice(None) if effect.everywhere else sites[k // shapes.shape[1]]
             for part, likely in together:
                 columns = first + k * width + np.asarray(part)
-                power = np.mean(lib.torque(along.effects, columns, np.asarray(likely)) ** 2, axis=0).sum()
+                power = np.mean(lib.torque(effects, columns, np.asarray(likely)) ** 2, axis=0).sum()
                 if power > 0.0:
                     amplitudes[columns] = np.asarray(likely) * REFERENCE_SHARE * np.linalg.norm(torque[joints])
                     amplitudes[columns] /= np.sqrt(power)
