@@ -75,7 +75,7 @@ def test_sums_over_windows_are_the_sums_over_all_rows(monkeypatch):
         assert one.rows == pytest.approx(other.rows)
         size = np.sqrt(np.diagonal(one.blocks[0]))
         square = np.outer(size, size)
-        np.testing.assert_allclose(other.blocks[0] / square, one.blocks[0] / square, atol=2e-4)  # springs ring on
+        np.testing.assert_allclose(other.blocks[0] / square, one.blocks[0] / square, atol=2e-3)  # springs ring on
 
 
 def test_blocks_of_the_columns_that_are_held_add_up_to_the_same():
