@@ -29,6 +29,7 @@ RINGING = 0.1  # their damping ratio
 MOTION_BLOCK = 2.5  # s left out together
 RIDGES = (0.003, 0.03, 0.3, 3.0, 30.0)  # of the features' variance; the best one counts, in the null as well
 TIME_BAND = 1.0  # Hz up to which the competitor of time follows
+MOST_COSINES = 600  # of a recording: along one of more than five minutes they follow no faster than these do
 TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
 NEARLY = 2.0 / 3.0
 
@@ -222,7 +223,7 @@ def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
     features, folds = [], []
     for r, (s, pick) in enumerate(zip(stretches, rows.pick, strict=True)):
         length = s.t[-1] - s.t[0]
-        count = max(int(2.0 * TIME_BAND * length), 2)
+        count = min(max(int(2.0 * TIME_BAND * length), 2), MOST_COSINES)
         own = np.cos(np.pi * np.outer((s.t[pick] - s.t[0]) / length, np.arange(count)))
         features.append((r, own))
         folds.append(((s.t[pick] - s.t[0]) / TIME_BLOCK).astype(int) % 5)
