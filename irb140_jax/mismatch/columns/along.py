@@ -208,7 +208,7 @@ def _bounded(lib: Library, effects: np.ndarray) -> np.ndarray:
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
 @eqx.filter_jit(compiler_options=QUICK)  # pyright: ignore[reportCallIssue]: passed on to jax.jit, says its docstring
 def _columns(effect, sites, shapes, motion):
-    per_shape = jax.vmap(partial(effect.columns, motion), in_axes=(None, 0))
+    per_shape = jax.vmap(partial(effect.law.columns, motion), in_axes=(None, 0))
     c = jax.vmap(per_shape)(jnp.asarray(sites), jnp.asarray(shapes))  # (S, G, T, m, k)
     return jnp.moveaxis(c, 2, 0).reshape(len(motion.t), -1)
 
