@@ -1,5 +1,6 @@
 """What every effect of the catalogue must keep: its formula, its units, its bounds, and the laws of physics."""
 
+import dataclasses
 import re
 import sys
 
@@ -14,8 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irb140_jax import dynamics, effects
-from irb140_jax.effects import Motion, Scales
+from irb140_jax.effects import At, Motion, Place, Prior, Scales
 from irb140_jax.effects.catalogue import CATALOGUE, _found
+from irb140_jax.errors import InputError
 from irb140_jax.mismatch.columns.torques import Named
 from irb140_jax.mismatch.corrected.model import CorrectedModel, predict
 from irb140_jax.recordings.concealed.catalogue import HIDDEN
@@ -119,16 +121,22 @@ def test_columns_bounds_and_variants_are_of_one_length(effect):
     assert effect.law.physical(jnp.ones(columns.shape[-1]), shape).shape == (len(effect.law.parameters),)
 
 
-@every_effect
-def test_the_records_of_an_effect_go_together(effect):
-    law, shapes, export = effect.law, effect.shapes, effect.export
-    assert (law.to_log is not None) == effect.place.at.in_log
-    assert law.to_physical is None or law.from_physical is not None
-    assert (shapes.scan is None) == (shapes.around is None)
-    assert (shapes.scanned > 1) == (shapes.scan is not None or shapes.scout is not None)
-    assert (shapes.follows is None) == (effect.prior.at_shape is None)
-    assert export.step is None or (export.history is not None and export.memory is not None)
-    assert len(effect.prior.proportion) in (0, len(law.own))
+@pytest.mark.parametrize(
+    ("slug", "records", "said"),
+    [
+        ("stribeck_friction", {"prior": Prior(lowest=(0.0,))}, "each of the law's 2 columns"),
+        ("payload", {"prior": Prior(proportion=(1.0,))}, "proportion"),
+        ("actuator_lag", {"place": Place(At.DRIVE)}, "`to_log`"),
+        ("coulomb_friction", {"place": Place(At.LOG_SCALE)}, "`to_log`"),
+        ("time_delay", {"prior": Prior()}, "`at_shape`"),
+        ("backlash", {"shapes": dataclasses.replace(CATALOGUE["backlash"].shapes, around=None)}, "`around`"),
+        ("actuator_lag", {"export": dataclasses.replace(CATALOGUE["actuator_lag"].export, memory=None)}, "`memory`"),
+    ],
+)
+def test_records_that_do_not_go_together_are_refused_by_name(slug, records, said):
+    with pytest.raises(InputError, match=slug) as error:
+        dataclasses.replace(CATALOGUE[slug], **records)
+    assert said in str(error.value)
 
 
 @every_effect

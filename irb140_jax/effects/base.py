@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from irb140_jax.effects.records import NO_SHAPE, NOT_IN_MJCF, Export, Law, Place, Prior, Shapes, Values
+from irb140_jax.errors import InputError
 from irb140_jax.robot import Robot
 
 # Times the torque that the shape of a simulated link accounts for: beyond, it stands in for something else, as a spring
@@ -48,6 +49,22 @@ class Effect:
     prior: Prior = Prior()
     shapes: Shapes = NO_SHAPE
     export: Export = NOT_IN_MJCF
+
+    def __post_init__(self):
+        law, prior, shapes, export = self.law, self.prior, self.shapes, self.export
+        rules = {
+            f"bounds for each of the law's {law.width} columns, or none": all(
+                len(x) in (0, law.width) for x in (prior.lowest, prior.highest)),
+            "a proportion for each of the law's own columns, or none": len(prior.proportion) in (0, len(law.own)),
+            "`to_log` in laws of the log and in no others": (law.to_log is not None) == self.place.at.in_log,
+            "`from_physical` where there is `to_physical`": law.to_physical is None or law.from_physical is not None,
+            "`around` where there is `scan`": (shapes.scan is None) == (shapes.around is None),
+            "`at_shape` where a shape `follows`": shapes.follows is None or prior.at_shape is not None,
+            "`history` and `memory` where there is `step`": not export.step or bool(export.history and export.memory),
+        }  # fmt: skip
+        for rule, is_kept in rules.items():
+            if not is_kept:
+                raise InputError(f"effect {self.slug!r}: an effect has {rule}; see docs/adding-an-effect.md")
 
     def bounds(self, robot: Robot, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest admissible amplitude of each column at a site, shapes (k,)."""

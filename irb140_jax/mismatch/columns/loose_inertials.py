@@ -7,6 +7,10 @@ def _columns(motion, joints, shape):
     raise NotImplementedError("these columns are the regressor's")
 
 
+def _amplitudes(values):
+    raise NotImplementedError("inertials have no amplitudes of their own")
+
+
 # A link whose inertials are wrong beyond the stated uncertainty, competing with physics.
 LOOSE_INERTIALS = Effect(
     slug="inertials",
@@ -19,6 +23,7 @@ LOOSE_INERTIALS = Effect(
         parameters=(),
         columns=_columns,
         to_physical=lambda w, shape: w[:0],
+        from_physical=_amplitudes,
         variants=(tuple(range(10)),),
     ),
 )
