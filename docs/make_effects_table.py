@@ -26,17 +26,17 @@ def page() -> str:
     lines = [HEAD, "| effect | torque | parameters | special case | needs |", "| --- | --- | --- | --- | --- |"]
     for slug, effect in sorted(CATALOGUE.items()):
         parameters = "<br>".join(
-            f"`{p.name}` [{effect.unit(p, False)}{parameter_range(p.low, p.high)}]" for p in effect.parameters
+            f"`{p.name}` [{p.unit_of(False)}{parameter_range(p.low, p.high)}]" for p in effect.law.parameters
         )
-        special = ", ".join(f"`{c}`" for c in effect.contains)
-        cells = (f"`{slug}`", f"`{effect.equation}`", parameters, special, effect.needs)
+        special = ", ".join(f"`{c}`" for c in effect.law.contains)
+        cells = (f"`{slug}`", f"`{effect.law.equation}`", parameters, special, effect.needs)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     lines += ["", "## What looks alike, and what separates it", ""]
     lines += ["| effect | look-alike | record |", "| --- | --- | --- |"]
     for slug, effect in sorted(CATALOGUE.items()):
         lines += [f"| `{slug}` | `{other}` | {motion} |" for other, motion in sorted(effect.confused_with.items())]
     lines += ["", "## Sources", ""]
-    lines += [f"- `{slug}`: {effect.source}." for slug, effect in sorted(CATALOGUE.items())]
+    lines += [f"- `{slug}`: {effect.law.source}." for slug, effect in sorted(CATALOGUE.items())]
     return "\n".join(lines) + "\n"
 
 

@@ -138,7 +138,7 @@ def _overlap(a: Concealment, b: Concealment) -> bool:
     """Whether two effects are special cases of one another at one joint: together they are one law."""
     if not set(a.joints) & set(b.joints):
         return False
-    contains = {s: set(CATALOGUE[s].contains) if s in CATALOGUE else set() for s in (a.effect, b.effect)}
+    contains = {s: set(CATALOGUE[s].law.contains) if s in CATALOGUE else set() for s in (a.effect, b.effect)}
     return a.effect in contains[b.effect] or b.effect in contains[a.effect]
 
 
@@ -157,7 +157,7 @@ def judged(kind: Kind, seed: int) -> dict:
     }  # fmt: skip
     told = {e["effect"] for e in case.truth["effects"]} & set(CATALOGUE)
     # Beside them their special cases: an oracle without them would call dry friction asymmetric whatever the data say.
-    told |= {special for slug in told for special in CATALOGUE[slug].contains}
+    told |= {special for slug in told for special in CATALOGUE[slug].law.contains}
     if told and (kind == "single" or trials_report.missed(record)):
         oracle = diagnose(robot, recordings, DiagnoseConfig(effects=tuple(CATALOGUE[s] for s in told))).diagnosis
         record["oracle"] = {"fit": oracle["fit"], "found": oracle["findings"]}

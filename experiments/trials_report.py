@@ -48,7 +48,8 @@ def founds(case: dict) -> set:
 
 def missed(case: dict) -> set:
     """What is hidden and has no finding; ordinary friction is in the law found at its joint that contains it."""
-    held = {(s, js) for slug, js in truths(case) & founds(case) if slug in CATALOGUE for s in CATALOGUE[slug].contains}
+    laws = {(CATALOGUE[slug].law, js) for slug, js in truths(case) & founds(case) if slug in CATALOGUE}
+    held = {(slug, js) for law, js in laws for slug in law.contains}
     return truths(case) - founds(case) - held
 
 
@@ -153,7 +154,7 @@ def _errors(cases: list[dict]) -> list[tuple[float, bool, float]]:
     for case in cases:
         for e in case["truth"]:
             slug, joints = _key(e)
-            special = CATALOGUE[slug].contains if slug in CATALOGUE else ()
+            special = CATALOGUE[slug].law.contains if slug in CATALOGUE else ()
             if any((s, joints) in truths(case) for s in special):
                 continue
             for f in case["found"]:

@@ -51,13 +51,14 @@ def robot():
 
 def a_shape(effect, joints=0):
     """A shape in the middle of the grid."""
-    site = effect.sites(robot())[joints]
-    grid = effect.shapes(SCALES, site)
+    site = effect.place.sites(robot())[joints]
+    grid = effect.shapes.grid(SCALES, site)
     return jnp.asarray(site), jnp.asarray(grid[len(grid) // 2])
 
 
 def some_values(effect, seed=0):
     """Physical parameters away from zero, from one and from each other."""
     rng = np.random.default_rng(seed)
-    values = {p.name: float(rng.uniform(max(p.low, 0.3) + 0.02, min(p.high, 2.0) - 0.02)) for p in effect.parameters}
+    between = lambda p: float(rng.uniform(max(p.low, 0.3) + 0.02, min(p.high, 2.0) - 0.02))  # noqa: E731
+    values = {p.name: between(p) for p in effect.law.parameters}
     return values | ({"recording": 1.0} if "recording" in values else {})  # the one that `motion` is

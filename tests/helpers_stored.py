@@ -27,8 +27,8 @@ def model() -> CorrectedModel:
 
 def open_questions() -> Undecided:
     """Friction of the elbow may be dry or viscous, and the rotor of the wrist could not be seen."""
-    columns = (Column("coulomb_friction", (1,), (), (0,)), Column("viscous_friction", (1,), (), (0,)),
-               Column("rotor_inertia", (2,), (), (0,)))  # fmt: skip
+    at = {"coulomb_friction": 1, "viscous_friction": 1, "rotor_inertia": 2}
+    columns = tuple(Column(CATALOGUE[slug], (joint,), (), (0,)) for slug, joint in at.items())
     gram = np.eye(34)
     gram[:-1, -1] = gram[-1, :-1] = 0.1
     gram[30, 31] = gram[31, 30] = 0.9

@@ -5,12 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from irb140_jax.effects import Scales
-from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.effects.contact import _around, _gain, _wall
+from irb140_jax.effects import Scales, external_wrench
+from irb140_jax.effects.contact import _alike, _around, _finer, _gain, _peak, _scout, _wall
 from irb140_jax.effects.left_over import LeftOver
 
-CONTACT = CATALOGUE["contact"]
 ACROSS = np.array([0.6, 0.0, 0.8])  # the arm moves in the plane across it
 STIFFNESS = 800.0
 NONE = np.zeros(2)
@@ -47,7 +45,7 @@ def test_a_wall_is_sought_where_the_arm_moves_and_tilted_only_there(seed):
     rng = np.random.default_rng(seed)
     normal = rng.normal(size=3)
     left, wall = left_over(seed, normal / np.linalg.norm(normal))
-    grid = CONTACT.scout(left, SCALES, np.arange(2))
+    grid = _scout(left, SCALES, np.arange(2))
     assert grid is not None
     np.testing.assert_allclose(grid[:, :3] @ ACROSS, 0.0, atol=1e-9)
     flat = wall[:3] - ACROSS * (ACROSS @ wall[:3])
@@ -55,7 +53,7 @@ def test_a_wall_is_sought_where_the_arm_moves_and_tilted_only_there(seed):
     assert grid[0, :3] @ flat / size > np.cos(0.02)
     assert grid[0, 3] == pytest.approx((wall[3] - 0.3 * (ACROSS @ wall[:3])) / size, abs=5e-3)
     rim = 1 + np.argmax(np.abs(grid[1:5] - grid[0]).sum(axis=1))
-    moved, kept = CONTACT.finer(grid, grid[rim]), CONTACT.finer(grid, grid[0])
+    moved, kept = _finer(grid, grid[rim]), _finer(grid, grid[0])
     width = lambda g: np.ptp(g[1:5, :3], axis=0).max()  # noqa: E731
     assert width(kept) == pytest.approx(0.5 * width(grid), rel=0.01)
     # Where the best is at the rim, the next grid goes on from there as wide as before, and not out of the plane.
@@ -66,7 +64,7 @@ def test_a_wall_is_sought_where_the_arm_moves_and_tilted_only_there(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_a_wall_is_turned_about_the_place_of_contact(seed):
     left, _ = left_over(seed, np.array([0.0, 1.0, 0.0]))
-    grid = CONTACT.scout(left, SCALES, np.arange(2))
+    grid = _scout(left, SCALES, np.arange(2))
     assert grid is not None
     depth = np.maximum(grid[:, 3] - left.tool @ grid[:, :3].T, 0.0)
     # To first order a turn makes the wall deeper on one side and less deep on the other, by as much.
@@ -78,7 +76,7 @@ def test_a_wall_is_turned_about_the_place_of_contact(seed):
 def test_walls_that_are_alike_push_alike(seed):
     normal = np.array([0.0, 1.0, 0.0])
     left, wall = left_over(seed, normal)
-    alike = CONTACT.alike(left, np.array([STIFFNESS]), wall)
+    alike = _alike(left, np.array([STIFFNESS]), wall)
     assert len(alike) == 2 and not np.allclose(alike[0], alike[1])
     pushed = STIFFNESS * _wall(left.tool, left.tool_jacobian, wall, np)
     for stiffness, *shape in alike:
@@ -89,10 +87,10 @@ def test_walls_that_are_alike_push_alike(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_forces_that_are_alike_move_no_joint_otherwise_and_only_where_there_are_such(seed):
-    push, shape = CATALOGUE["external_wrench"], np.array([1.0, 3.0, 1.0, 0.02])
+    shape = np.array([1.0, 3.0, 1.0, 0.02])
     force = np.random.default_rng(seed).normal(size=3)
     left, _ = left_over(seed, np.array([0.0, 1.0, 0.0]))
-    alike = push.alike(left, force, shape)
+    alike = external_wrench._alike(left, force, shape)
     np.testing.assert_allclose(np.delete(alike, [3, 4, 5], axis=1), [shape, shape])
     forces = alike[:, 3:6]
     # As strong as the push, either way, across the plane.
@@ -100,7 +98,7 @@ def test_forces_that_are_alike_move_no_joint_otherwise_and_only_where_there_are_
     np.testing.assert_allclose(sorted((forces - force).tolist()), sorted(expected.tolist()), atol=1e-9)
     np.testing.assert_allclose(left.tool_jacobian @ (forces[0] - force), 0.0, atol=1e-9)
     turned = dataclasses.replace(left, tool_jacobian=left.tool_jacobian + np.outer(np.sin(left.t), ACROSS)[:, None])
-    assert push.alike(turned, force, shape).shape == (0, 7)
+    assert external_wrench._alike(turned, force, shape).shape == (0, 7)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -111,7 +109,7 @@ def test_the_top_of_a_grid_is_nearer_to_the_wall_than_its_points(seed):
     off[:3] /= np.linalg.norm(off[:3])
     grid = _around(off, turn, 5e-3, shift)
     odds = np.array([_gain(left, point[None])[0] for point in grid])
-    top = CONTACT.peak(grid, grid[0], odds)
+    top = _peak(grid, grid[0], odds)
     assert _gain(left, top[None])[0] > odds.max()
     inadmissible = np.where(np.arange(len(grid)) == 5, -np.inf, odds)
-    np.testing.assert_array_equal(CONTACT.peak(grid, grid[0], inadmissible), grid[0])
+    np.testing.assert_array_equal(_peak(grid, grid[0], inadmissible), grid[0])

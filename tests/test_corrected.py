@@ -14,7 +14,7 @@ import pytest
 
 import irb140_jax as irb
 from irb140_jax.control import Reference, SlidingMode
-from irb140_jax.effects import AbstractEffect, Scales
+from irb140_jax.effects import Scales
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import corrected_robot, predict, prediction_times
@@ -46,7 +46,7 @@ OWN = {
     "presliding_hysteresis": {"stiffness": 40.0}, "gravity_spring": {"stiffness": 2.0},
     "joint_elasticity": {"stiffness": 5000.0}, "contact": {"stiffness": 500.0},
 }  # fmt: skip
-AT_ONCE = [slug for slug in CATALOGUE if slug in OWN or {p.name for p in CATALOGUE[slug].parameters} <= set(VALUES)]
+AT_ONCE = [slug for slug in CATALOGUE if slug in OWN or {p.name for p in CATALOGUE[slug].law.parameters} <= set(VALUES)]
 
 
 @functools.cache
@@ -62,8 +62,8 @@ def motion():
 
 def named(slug):
     effect = CATALOGUE[slug]
-    w, shape = effect.amplitudes(VALUES | OWN.get(slug, {}))
-    return Named(effect, tuple(map(int, effect.sites(arm())[0])), tuple(range(len(w))), w, shape)
+    w, shape = effect.law.amplitudes(VALUES | OWN.get(slug, {}))
+    return Named(effect, tuple(map(int, effect.place.sites(arm())[0])), tuple(range(len(w))), w, shape)
 
 
 def model(*slugs, rest=REST, phi=1.03):
@@ -139,14 +139,14 @@ def test_the_torque_can_be_differentiated_by_an_effects_parameter():
     np.testing.assert_allclose(slope.effects[0].amplitudes, qd[3, :1], rtol=1e-12)
 
 
-@pytest.mark.parametrize("slug", [slug for slug in AT_ONCE if CATALOGUE[slug].history])
+@pytest.mark.parametrize("slug", [slug for slug in AT_ONCE if CATALOGUE[slug].export.history])
 def test_a_torque_that_depends_on_what_was_before_is_refused_at_an_instant(slug):
     robot, state = corrected_robot(model(slug)), jnp.zeros(arm().n)
     with pytest.raises(InputError, match=slug):
         robot.inverse_dynamics(state, state, state)
 
 
-@pytest.mark.parametrize("slug", [s for s in AT_ONCE if CATALOGUE[s].history and not CATALOGUE[s].steps])
+@pytest.mark.parametrize("slug", [s for s in AT_ONCE if CATALOGUE[s].export.history and not CATALOGUE[s].export.step])
 def test_what_cannot_be_simulated_forward_is_refused_by_its_name(slug):
     with pytest.raises(InputError, match=slug):
         corrected_robot(model(slug)).at_rest(jnp.zeros(arm().n))
@@ -180,7 +180,7 @@ def test_a_drive_that_lags_gives_what_was_asked_for_one_time_constant_ago():
     assert 0.0 < off < 0.4 * unlagged  # a lag is a delay but for the curvature of the torque
 
 
-WHOLE = [slug for slug in AT_ONCE if CATALOGUE[slug].not_in_mjcf == ""]
+WHOLE = [slug for slug in AT_ONCE if CATALOGUE[slug].export.not_in_mjcf == ""]
 SECOND_ORDER = ("encoder_offset", "gravity_tilt")  # the fit has them to first order at the nominal inertials
 
 
@@ -218,7 +218,7 @@ def test_mujoco_reproduces_wrong_zeros_and_leaning_bases_to_second_order(slug):
     assert np.abs(off).max() < 0.03 * np.abs(fitted - plain).max()  # offset 0.02 rad, tilt 0.02 rad
 
 
-@pytest.mark.parametrize("slug", [s for s in AT_ONCE if CATALOGUE[s].mjcf and CATALOGUE[s].not_in_mjcf])
+@pytest.mark.parametrize("slug", [s for s in AT_ONCE if CATALOGUE[s].export.mjcf and CATALOGUE[s].export.not_in_mjcf])
 def test_the_part_that_mjcf_can_hold_brings_it_nearer(slug):
     one, m = model(slug, phi=1.0), motion()
     fitted = torques_along(one, as_conditioned(m)).corrected
@@ -240,10 +240,9 @@ def test_the_written_file_is_read_again_as_the_same_robot_and_says_what_it_lacks
 
 def test_every_effect_says_how_much_of_it_mjcf_can_express():
     for effect in CATALOGUE.values():
-        assert effect.mjcf or effect.not_in_mjcf, effect.slug
-        changed = type(effect).in_model is not AbstractEffect.in_model
-        assert changed == bool(effect.mjcf), effect.slug
-        assert not effect.not_in_mjcf.endswith("."), effect.slug
+        assert effect.export.mjcf or effect.export.not_in_mjcf, effect.slug
+        assert (effect.export.in_model is not None) == bool(effect.export.mjcf), effect.slug
+        assert not effect.export.not_in_mjcf.endswith("."), effect.slug
 
 
 def test_possible_inertials_stay_as_they_are():

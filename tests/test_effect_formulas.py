@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers_effects import SCALES, a_shape, every_effect, motion, robot, some_values
 
-from irb140_jax.effects.backlash import STEPS, _flight
+from irb140_jax.effects.backlash import STEPS, _flight, _scan
 from irb140_jax.effects.catalogue import CATALOGUE
 
 # The contract's equations written down once more: parameters, then qd, qdd, load and total torque of the site, (T, m).
@@ -140,12 +140,12 @@ LAWS_OF_MOTION = {
 
 @every_effect
 def test_columns_are_the_formula_of_the_contract(effect):
-    columns = eqx.filter_jit(effect.columns)
-    for site in range(len(effect.sites(robot()))):
+    columns = eqx.filter_jit(effect.law.columns)
+    for site in range(len(effect.place.sites(robot()))):
         for seed in range(3):
             joints, _ = a_shape(effect, site)
             m, values = motion(seed), some_values(effect, seed)
-            w, shape = effect.amplitudes(values | SIGN)
+            w, shape = effect.law.amplitudes(values | SIGN)
             torque = columns(m, joints, jnp.asarray(shape)) @ jnp.asarray(w)
             if effect.slug in LAWS_OF_MOTION:
                 law = LAWS_OF_MOTION[effect.slug](values, m, int(joints[0]))
@@ -157,9 +157,10 @@ def test_columns_are_the_formula_of_the_contract(effect):
 
 @pytest.mark.parametrize("slug", ["time_delay", "channel_skew"])
 def test_a_delays_finer_grid_lies_about_the_delay_that_was_found(slug):
-    law = CATALOGUE[slug]
+    shapes = CATALOGUE[slug].shapes
+    assert shapes.finer and shapes.follows
     grid = np.linspace(-0.016, 0.016, 33)[:, None]
-    finer = law.finer(grid, law.shape_of(np.array([-0.0111]), np.array([-0.0045])))
+    finer = shapes.finer(grid, shapes.follows(np.array([-0.0111]), np.array([-0.0045])))
     assert finer.mean() == pytest.approx(-0.00555) and np.ptp(finer) == pytest.approx(0.002)
 
 
@@ -168,7 +169,7 @@ def test_a_delay_that_is_on_the_grid_is_right_up_to_the_highest_frequency(delay)
     t, omega = np.arange(0.0, 2.0, 0.005), 2.0 * np.pi * 20.0
     rate = jnp.asarray(omega * np.cos(omega * t))[:, None]
     m = dataclasses.replace(motion(0), t=jnp.asarray(t), scaled_rate=rate)
-    law = CATALOGUE["time_delay"]
+    law = CATALOGUE["time_delay"].law
     w, shape = law.amplitudes({"delay": delay})
     made = np.asarray(law.columns(m, jnp.arange(1), jnp.asarray(shape)))[:, 0, 0] * w[0]
     inside = (t > 0.1) & (t < 1.9)  # rates are interpolated between samples: 3 % at 20 Hz
@@ -201,6 +202,6 @@ def test_the_more_a_flank_is_damped_the_less_a_link_bounces_off_it():
 @pytest.mark.parametrize("noise", [1e-5, 1e-3])
 def test_no_gap_below_ten_times_the_encoders_noise_is_looked_for(noise):
     """A gap of a few of them takes that noise out of the model's torque, and explains it."""
-    gaps = CATALOGUE["backlash"].scan(SCALES._replace(q_noise=np.full(4, noise)), np.array([1]))[:, 0]
+    gaps = _scan(SCALES._replace(q_noise=np.full(4, noise)), np.array([1]))[:, 0]
     assert gaps.min() >= 10.0 * noise
     assert gaps.max() > 10.0 * gaps.min()

@@ -9,6 +9,7 @@ from helpers_recordings import motion, recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.grids import Scales, nearest_in_each_direction
+from irb140_jax.effects.position_dependent_friction import _finer
 from irb140_jax.mismatch.selection import explain as loop
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
@@ -74,7 +75,7 @@ def test_what_is_hardly_seen_takes_no_more_rounds(height):
 
 def grid_of_stretches() -> np.ndarray:
     one = np.ones(1)
-    return FRICTION[1].shapes(Scales(one, one, one, -one, one, 10.0, one, one), np.array([0]))
+    return FRICTION[1].shapes.grid(Scales(one, one, one, -one, one, 10.0, one, one), np.array([0]))
 
 
 @pytest.mark.parametrize("step", [(0.3, 0.2), (-0.4, 0.1), (0.0, -0.45)])
@@ -84,10 +85,10 @@ def test_between_three_points_a_shape_is_where_their_parabola_is_highest(step):
     best = int(np.argmin(np.abs(axes - np.median(axes, axis=0)).sum(axis=1)))
     odds = -np.sum(([3.0, 7.0]) * (axes - axes[best] - step) ** 2, axis=1)
     assert best == np.argmax(odds)
-    top = FRICTION[1].peak(grid, grid[best], odds)
+    top = FRICTION[1].shapes.peak(grid, grid[best], odds)
     spacing = np.diff(np.unique(grid[:, 0]))[0], np.sqrt(5.0)
     np.testing.assert_allclose(top, grid[best] * [1.0, spacing[1] ** step[1]] + [spacing[0] * step[0], 0.0])
-    finer = FRICTION[1].finer(grid, top)
+    finer = _finer(grid, top)
     assert finer.shape == grid.shape and np.any(np.all(np.isclose(finer, top), axis=1))
     assert np.ptp(finer[:, 0]) < 0.3 * np.ptp(grid[:, 0])
     assert np.ptp(np.log(finer[:, 1])) == pytest.approx(0.5 * np.log(5.0))
@@ -97,7 +98,7 @@ def test_where_a_neighbour_is_inadmissible_the_best_point_stays():
     grid = grid_of_stretches()
     odds = np.full(len(grid), -np.inf)
     odds[10] = 1.0
-    np.testing.assert_allclose(FRICTION[1].peak(grid, grid[10], odds), grid[10])
+    np.testing.assert_allclose(FRICTION[1].shapes.peak(grid, grid[10], odds), grid[10])
 
 
 def test_a_grid_has_two_neighbours_in_each_of_its_directions():

@@ -48,8 +48,9 @@ def test_a_held_ball_weighs_as_in_mujoco(kinds):
     ball = tool.parent.add_body(pos=tool.pos, quat=tool.quat)
     ball.mass, ball.inertia, ball.explicitinertial = mass, 1e-12 * np.ones(3), True
     ball.ipos = np.asarray(robot.tool_rotation).T @ off  # `off` is in axes of the last link
-    w, shape = PAYLOAD.amplitudes({"mass": mass, **dict(zip("xyz", off, strict=True))})
-    heavier = PAYLOAD.in_model(robot, tuple(range(robot.n)), w, shape)
+    w, shape = PAYLOAD.law.amplitudes({"mass": mass, **dict(zip("xyz", off, strict=True))})
+    assert PAYLOAD.export.in_model
+    heavier = PAYLOAD.export.in_model(robot, tuple(range(robot.n)), w, shape)
     moving = rng.normal(size=(3, robot.n))
     more = [inverse_dynamics(m, *moving) for m in (oracle_model(spec.compile()), bare)]
     ours = [dynamics.inverse_dynamics(r, *map(jnp.asarray, moving)) for r in (heavier, robot)]

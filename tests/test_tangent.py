@@ -97,8 +97,8 @@ def test_at_its_own_point_the_rows_leave_what_the_model_leaves(explained):
 @pytest.mark.parametrize("which", ["inertials", *range(len(FOUND))])
 def test_columns_are_slopes_of_the_torque(explained, which):
     model, dphi, torques, rows = explained
-    if which != "inertials" and CATALOGUE[FOUND[which][0]].logged:
-        model, dphi, torques, rows = explained_by(lambda k: k == which or not CATALOGUE[FOUND[k][0]].logged)
+    if which != "inertials" and CATALOGUE[FOUND[which][0]].place.at.in_log:
+        model, dphi, torques, rows = explained_by(lambda k: k == which or not CATALOGUE[FOUND[k][0]].place.at.in_log)
     amplitudes = [a.copy() for a in amplitudes_of(model)]
     moved = dphi.copy()
     if which == "inertials":

@@ -72,7 +72,7 @@ def test_every_kind_changes_the_log_and_states_its_truth_in_the_contracts_words(
     for h in case.truth["hidden"]:
         assert {*h["accept"], *h["tolerate"]} <= set(CATALOGUE) and (h["slug"] in h["accept"] or h["slug"] is None)
         if h["slug"] and h["slug"] != "external_wrench":
-            assert set(h["parameters"]) <= {p.name for p in CATALOGUE[h["slug"]].parameters}
+            assert set(h["parameters"]) <= {p.name for p in CATALOGUE[h["slug"]].law.parameters}
 
 
 def test_nothing_hidden_leaves_the_rigid_body():

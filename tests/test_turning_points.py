@@ -46,7 +46,7 @@ def test_turning_points_hold_what_bristles_remember(seed, start, travel):
 
 
 def test_columns_of_presliding_friction_go_on_over_the_seams_of_a_long_recording():
-    law, seam, site = CATALOGUE["presliding_hysteresis"], 250, jnp.array([0])
+    law, seam, site = CATALOGUE["presliding_hysteresis"].law, 250, jnp.array([0])
     q = np.tile(0.1 * np.sin(0.07 * np.arange(400))[:, None], len(KINDS))
     whole = dataclasses.replace(motion(samples=400), q=jnp.asarray(q))
     turned = turned_before(q, [turning_points(x) for x in q.T], seam, 8)

@@ -80,7 +80,7 @@ def test_sums_over_windows_are_the_sums_over_all_rows(monkeypatch):
 
 def test_blocks_of_the_columns_that_are_held_add_up_to_the_same():
     data, extra, noise, whole = the_grams()
-    usual = [e for e in CATALOGUE.values() if e.ordinary]
+    usual = [e for e in CATALOGUE.values() if e.prior.ordinary]
     small = library(ROBOT, usual, SCALES)
     held = assembled(small, [stretch(small, ALONG, 0, BAND, FACTOR)], 0.05)
     by_block = grams_by_block(held, extra, noise, SENSORS, np.arange(10 * N + small.size), 5)

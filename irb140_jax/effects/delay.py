@@ -4,55 +4,59 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.records import Export, Law, Parameter, Prior, Shapes
 
 HALVES = tuple(0.001 * k for k in range(-16, 17))  # s: half of the delays that are tried first
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # on -1 to 1: slopes whose mean is that over the delay
 
 
-class AbstractDelay(AbstractEffect):
+def law(equation: str, columns) -> Law:
     """q_logged(t) = q(t - delay): the logged torque belongs to a later motion, tau(t + delay).
 
     tau(t + delay) - tau(t) is delay times the mean slope from t to t + delay; the shape is half of the time over which
     that is taken, and where that is not half the delay, it is right to first order.
+
+    Args:
+        equation: In plain text.
+        columns: See `Law`.
     """
+    return Law(
+        equation=equation,
+        source="Ljung, System Identification, 1999, ch. 4",
+        parameters=(Parameter("delay", "s"),),
+        columns=columns,
+        from_physical=lambda values: (np.array([values["delay"]]), np.array([0.5 * values["delay"]])),
+        to_log=_to_log,
+    )
 
-    source = "Ljung, System Identification, 1999, ch. 4"
-    parameters = (Parameter("delay", "s"),)
-    variants = ((0,),)
-    logged = 2
-    shape_follows = True
-    history = "is a shift between the clocks of the log, which pairs each torque with an earlier position"
-    not_in_mjcf = "it belongs to the clocks of the log, not to the arm"
 
-    def shapes(self, scales, joints):
-        return np.array(HALVES)[:, None]
+def _to_log(x, dt, w, shape):
+    t, slope = dt * np.arange(len(x)), np.gradient(x, dt, axis=0)
+    at = t + shape[0] * (1.0 + NODES[:, None])
+    return w[0] * np.stack([0.5 * WEIGHTS @ np.interp(at, t, s) for s in slope.T], axis=1)
 
-    def refines(self):
-        return True
 
-    def finer(self, grid, best):
-        step = np.min(np.diff(np.sort(grid[:, 0])))
-        return best[0] + np.linspace(-step, step, len(grid))[:, None]
+def _at_shape(shape):
+    # The slope is taken over the delay itself, give or take the spacing of the delays that are tried.
+    spacing = 2.0 * (HALVES[1] - HALVES[0])
+    return 2.0 * shape - spacing, 2.0 * shape + spacing
 
-    def shape_of(self, w, shape):
-        return 0.5 * w
 
-    def at_shape(self, shape):
-        # The slope is taken over the delay itself, give or take the spacing of the delays that are tried.
-        spacing = 2.0 * (HALVES[1] - HALVES[0])
-        return 2.0 * shape - spacing, 2.0 * shape + spacing
+def _grid(scales, joints):
+    return np.array(HALVES)[:, None]
 
-    def passed_on(self, x, dt, w, shape):
-        t, slope = dt * np.arange(len(x)), np.gradient(x, dt, axis=0)
-        at = t + shape[0] * (1.0 + NODES[:, None])
-        return w[0] * np.stack([0.5 * WEIGHTS @ np.interp(at, t, s) for s in slope.T], axis=1)
 
-    def physical(self, w, shape):
-        return w
+def _finer(grid, best):
+    step = np.diff(np.sort(grid[:, 0])).min()
+    return best[0] + np.linspace(-step, step, len(grid))[:, None]
 
-    def amplitudes(self, values):
-        return np.array([values["delay"]]), np.array([0.5 * values["delay"]])
+
+PRIOR = Prior(at_shape=_at_shape)
+SHAPES = Shapes(grid=_grid, finer=_finer, follows=lambda w, shape: 0.5 * w)
+EXPORT = Export(
+    not_in_mjcf="it belongs to the clocks of the log, not to the arm",
+    history="is a shift between the clocks of the log, which pairs each torque with an earlier position",
+)
 
 
 def mean_slopes(t: jax.Array, rate: jax.Array, half: jax.Array) -> jax.Array:

@@ -1,55 +1,39 @@
 """Encoder offset: the zero of a joint is wrong."""
 
 import jax.numpy as jnp
-import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter
-from irb140_jax.effects.native import with_joint
+from irb140_jax.effects.base import Effect
+from irb140_jax.effects.native import adds_to
+from irb140_jax.effects.records import Export, Law, Parameter, Place, Prior
 
 LARGEST = 0.5  # [rad or m]; beyond it first order is wrong, and a person sees it
 
 
-class EncoderOffset(AbstractEffect):
+def _columns(motion, joints, shape):
     """q_logged = q + offset: tau(q_logged - offset) - tau(q_logged), to first order, on every joint."""
+    return -jnp.take(motion.rigid.by_q, joints, axis=2)
 
-    slug = "encoder_offset"
-    title = "a wrong encoder zero"
-    equation = "-offset d tau/d q_j"
-    source = "Hollerbach, Khalil, Gautier, Springer Handbook of Robotics, 2016, ch. 6"
-    parameters = (Parameter("offset", "{q}"),)
-    variants = ((0,),)
-    confused_with = {
+
+EFFECT = Effect(
+    slug="encoder_offset",
+    title="a wrong encoder zero",
+    needs=(
+        "postures in which the derivative of the gravity torque by this joint's position changes sign, or a check of "
+        "the zero mark"
+    ),
+    confused_with={
         "torque_offset": "postures in which the derivative of the gravity torque by position changes sign",
         "gravity_tilt": "a sweep of the first joint over its range",
         "gravity_spring": "the whole range of the joint: a spring torque is linear in position, gravity torque is not",
-    }
-    needs = (
-        "postures in which the derivative of the gravity torque by this joint's position changes sign, or a check of "
-        "the zero mark"
-    )
-    leans_on_inertials = True
-    everywhere = True
-    mjcf = "the joint's ref"
-    not_in_mjcf = ""
-
-    def columns(self, motion, joints, shape):
-        return -jnp.take(motion.rigid.by_q, joints, axis=2)
-
-    def lowest(self, robot, joints):
-        return np.full(1, -LARGEST)
-
-    def highest(self, robot, joints):
-        return np.full(1, LARGEST)
-
-    def physical(self, w, shape):
-        return w
-
-    def amplitudes(self, values):
-        return np.array([values["offset"]]), np.zeros(0)
-
-    def in_model(self, robot, joints, w, shape):
-        return with_joint(robot, "reference", joints[0], w[0])
-
-    def where(self, names, values, units):
-        offset = f"{values['offset']:.3g} {units['offset']}"
-        return f"{names}: wherever the torque changes with this joint's position; its zero is off by {offset}"
+    },
+    where="wherever the torque changes with this joint's position; its zero is off by {offset}",
+    law=Law(
+        equation="-offset d tau/d q_j",
+        source="Hollerbach, Khalil, Gautier, Springer Handbook of Robotics, 2016, ch. 6",
+        parameters=(Parameter("offset", "{q}"),),
+        columns=_columns,
+    ),
+    place=Place(everywhere=True),
+    prior=Prior(lowest=(-LARGEST,), highest=(LARGEST,), of_rigid_body=True),
+    export=Export(mjcf="the joint's ref", in_model=adds_to("reference")),
+)

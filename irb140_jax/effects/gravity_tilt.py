@@ -5,57 +5,26 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.base import Effect
+from irb140_jax.effects.records import Export, Law, Parameter, Place, Prior, all_joints
 
 LARGEST = 0.5  # [rad]; beyond it first order is wrong, and a person sees it
 
 
-class GravityTilt(AbstractEffect):
+def _columns(motion, joints, shape):
     """Torque of a tilted gravity vector: tau_g(g + g tilt e), e perpendicular to gravity, in two components."""
+    return jnp.einsum("tng,kg->tnk", motion.rigid.by_gravity, motion.rigid.gravity * motion.rigid.across)
 
-    slug = "gravity_tilt"
-    title = "a base that is not level"
-    equation = "d g(q)/d gravity . g tilt e"
-    source = "Siciliano et al., Robotics, 2009, ch. 7, gravity in base axes"
-    parameters = (Parameter("tilt", "rad", low=0.0),)
-    variants = ((0, 1),)
-    confused_with = {
-        "payload": "the same poses with and without a known mass",
-        "encoder_offset": "a sweep of the first joint over its range",
-    }
-    needs = "a sweep of the first joint, in postures whose gravity torques are not all in proportion"
-    leans_on_inertials = True
-    everywhere = True
-    vector = True
-    mjcf = "the gravity of the option element"
-    not_in_mjcf = ""
 
-    def sites(self, robot):
-        return np.arange(robot.n)[None, :]
+def _from_physical(values):
+    direction = values.get("direction", 0.0)
+    return values["tilt"] * np.array([np.cos(direction), np.sin(direction)]), np.zeros(0)
 
-    def columns(self, motion, joints, shape):
-        return jnp.einsum("tng,kg->tnk", motion.rigid.by_gravity, motion.rigid.gravity * motion.rigid.across)
 
-    def lowest(self, robot, joints):
-        return np.full(2, -LARGEST)
-
-    def highest(self, robot, joints):
-        return np.full(2, LARGEST)
-
-    def physical(self, w, shape):
-        return jnp.hypot(w[0], w[1])[None]
-
-    def amplitudes(self, values):
-        direction = values.get("direction", 0.0)
-        return values["tilt"] * np.array([np.cos(direction), np.sin(direction)]), np.zeros(0)
-
-    def in_model(self, robot, joints, w, shape):
-        g = np.asarray(robot.gravity)
-        leant = g + np.linalg.norm(g) * np.asarray(w) @ np.asarray(across(robot.gravity))
-        return eqx.tree_at(lambda r: r.gravity, robot, jnp.asarray(leant))
-
-    def where(self, names, values, units):
-        return f"{names}: in the gravity torque, at rest too; the base tilts by {np.degrees(values['tilt']):.3g} deg"
+def _in_model(robot, joints, w, shape):
+    g = np.asarray(robot.gravity)
+    leant = g + np.linalg.norm(g) * np.asarray(w) @ np.asarray(across(robot.gravity))
+    return eqx.tree_at(lambda r: r.gravity, robot, jnp.asarray(leant))
 
 
 def across(gravity: Float[Array, "3"]) -> Float[Array, "2 3"]:
@@ -68,3 +37,27 @@ def across(gravity: Float[Array, "3"]) -> Float[Array, "2 3"]:
     first = jnp.cross(down, jnp.eye(3)[jnp.argmin(jnp.abs(down))])
     first = first / jnp.linalg.norm(first)
     return jnp.stack([first, jnp.cross(down, first)])
+
+
+EFFECT = Effect(
+    slug="gravity_tilt",
+    title="a base that is not level",
+    needs="a sweep of the first joint, in postures whose gravity torques are not all in proportion",
+    confused_with={
+        "payload": "the same poses with and without a known mass",
+        "encoder_offset": "a sweep of the first joint over its range",
+    },
+    where="in the gravity torque, at rest too; the base tilts by {tilt:deg}",
+    law=Law(
+        equation="d g(q)/d gravity . g tilt e",
+        source="Siciliano et al., Robotics, 2009, ch. 7, gravity in base axes",
+        parameters=(Parameter("tilt", "rad", low=0.0),),
+        columns=_columns,
+        to_physical=lambda w, shape: jnp.hypot(w[0], w[1])[None],
+        from_physical=_from_physical,
+        variants=((0, 1),),
+    ),
+    place=Place(sites=all_joints, everywhere=True),
+    prior=Prior(lowest=(-LARGEST, -LARGEST), highest=(LARGEST, LARGEST), vector=True, of_rigid_body=True),
+    export=Export(mjcf="the gravity of the option element", in_model=_in_model),
+)

@@ -1,7 +1,10 @@
 """Changes of a model by which effects become numbers that MJCF has: friction, rotors, springs, gears."""
 
+from collections.abc import Callable
+
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 
 from irb140_jax.robot import Robot
 
@@ -16,6 +19,11 @@ def with_joint(robot: Robot, field: str, joint: int, change: float) -> Robot:
     if field in ("frictionloss", "damping", "armature"):
         changed = changed.at[joint].max(0.0)
     return eqx.tree_at(lambda r: getattr(r, field), robot, changed)
+
+
+def adds_to(field: str) -> Callable[[Robot, tuple[int, ...], np.ndarray, np.ndarray], Robot]:
+    """Of an effect whose first amplitude is that much more of a number of its joint: `in_model` of `Export`."""
+    return lambda robot, joints, w, shape: with_joint(robot, field, joints[0], w[0])
 
 
 def with_spring(robot: Robot, joint: int, slope: float, constant: float) -> Robot:

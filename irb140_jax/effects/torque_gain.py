@@ -2,55 +2,43 @@
 
 import numpy as np
 
-from irb140_jax.effects.base import AbstractEffect, Parameter
+from irb140_jax.effects.base import Effect
 from irb140_jax.effects.motion import of_site
 from irb140_jax.effects.native import with_gear
+from irb140_jax.effects.records import At, Export, Law, Parameter, Place, Prior
 
 LARGEST = 3.0  # beyond, a column holds another unit or another side of the gear
 
 
-class TorqueGain(AbstractEffect):
+def _columns(motion, joints, shape):
     """real torque = gain x logged torque, so the log holds (1/gain - 1) x real torque beyond the model."""
+    return of_site(motion.total, joints)[:, :, None]
 
-    slug = "torque_gain"
-    title = "a wrong torque constant"
-    equation = "(1/gain - 1) tau_model"
-    source = "Gautier and Briot, Global identification of joint drive gains, JMR 6(2), 2014"
-    parameters = (Parameter("gain", "1", low=1 / LARGEST, high=LARGEST),)
-    variants = ((0,),)
-    confused_with = {
+
+EFFECT = Effect(
+    slug="torque_gain",
+    title="a wrong torque constant",
+    needs="large gravity torque on this joint and on others with the same links, or a known payload",
+    confused_with={
         "payload": "the same motion with and without a known payload",
         "rotor_inertia": "postures with large gravity torque: a gain scales gravity torque, a rotor does not",
         "load_dependent_friction": "the same loads at rest",
-    }
-    logged = 1
-    typical = 0.1  # what torque constants are known to
-    needs = "large gravity torque on this joint and on others with the same links, or a known payload"
-    mjcf = "the gear of the actuator"
-    not_in_mjcf = ""
-
-    def columns(self, motion, joints, shape):
-        return of_site(motion.total, joints)[:, :, None]
-
-    def passed_on(self, x, dt, w, shape):
-        return w[0] * x
-
-    def physical(self, w, shape):
-        return 1.0 / (1.0 + w)
-
-    def amplitudes(self, values):
-        return np.array([1.0 / values["gain"] - 1.0]), np.zeros(0)
-
-    def lowest(self, robot, joints):
-        return np.full(1, 1.0 / LARGEST - 1.0)
-
-    def highest(self, robot, joints):
-        return np.full(1, LARGEST - 1.0)
-
-    def in_model(self, robot, joints, w, shape):
-        return with_gear(robot, joints[0], 1.0 / (1.0 + w[0]))
-
-    def where(self, names, values, units):
-        return (
-            f"{names}: in proportion to the whole torque; the real torque is {values['gain']:.3g} times the logged one"
-        )
+    },
+    where="in proportion to the whole torque; the real torque is {gain:.3g} times the logged one",
+    law=Law(
+        equation="(1/gain - 1) tau_model",
+        source="Gautier and Briot, Global identification of joint drive gains, JMR 6(2), 2014",
+        parameters=(Parameter("gain", "1", low=1 / LARGEST, high=LARGEST),),
+        columns=_columns,
+        to_physical=lambda w, shape: 1.0 / (1.0 + w),
+        from_physical=lambda values: (np.array([1.0 / values["gain"] - 1.0]), np.zeros(0)),
+        to_log=lambda x, dt, w, shape: w[0] * x,
+    ),
+    place=Place(At.LOG_SCALE),
+    # Typical is what torque constants are known to.
+    prior=Prior(typical=0.1, lowest=(1.0 / LARGEST - 1.0,), highest=(LARGEST - 1.0,)),
+    export=Export(
+        mjcf="the gear of the actuator",
+        in_model=lambda robot, joints, w, shape: with_gear(robot, joints[0], 1.0 / (1.0 + w[0])),
+    ),
+)

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.errors import RecordingError
+from irb140_jax.effects.torque_gain import EFFECT as TORQUE_GAIN
+from irb140_jax.errors import InputError, RecordingError
 from irb140_jax.mismatch.columns.torques import Named, scaled
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file, native_gap
@@ -62,21 +63,29 @@ class DiagnoseConfig:
 
     Attributes:
         inertial_uncertainty: Relative standard deviation of the model's inertial parameters.
-        effects: The library; by default every effect of the catalogue.
+        effects: The library; by default every effect of the catalogue.  Others may stand beside them or in their place.
         words: What the command line said beside the recordings and the uncertainty, to be kept in the diagnosis:
             `--robot arm.xml`.
         known_joints: Every joint of the model's file, where the robot is a part of it; see `CorrectedModel`.
     """
 
     inertial_uncertainty: float = 0.05
-    effects: tuple[AbstractEffect, ...] = tuple(CATALOGUE.values())
+    effects: tuple[Effect, ...] = tuple(CATALOGUE.values())
     words: tuple[str, ...] = ()
     known_joints: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        for effect in self.effects:
+            if not isinstance(effect, Effect):
+                raise InputError(f"effects: got {effect!r}; allowed are `Effect` objects, as `CATALOGUE` holds them")
+        slugs = [effect.slug for effect in self.effects]
+        if twice := {slug for slug in slugs if slugs.count(slug) > 1}:
+            raise InputError(f"effects: {', '.join(sorted(twice))} given twice; the search tells them by their slugs")
 
     @property
     def options(self) -> dict[str, Any]:
         """The options by name, as they are kept in the diagnosis."""
-        everything = {e.slug for e in self.effects} == set(CATALOGUE)
+        everything = set(self.effects) == set(CATALOGUE.values())
         effects = "all" if everything else [e.slug for e in self.effects]
         return {"inertial_uncertainty": self.inertial_uncertainty, "effects": effects}
 
@@ -139,7 +148,7 @@ def _diagnosed(
         servo_notes += harmful_notes(robot, harmful)
         proof = proof.without_discrepancy(harmful)
         model = dataclasses.replace(model, discrepancy=model.discrepancy.on(~harmful))
-    lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.not_in_mjcf))
+    lacking = list(dict.fromkeys(n.effect.title for n in model.named if n.effect.export.not_in_mjcf))
     beyond = beyond_file(model, smooth, by_laws)
     gap = None if beyond is None else native_gap(beyond, band)
     gap = gap_notes(robot, gap, torque_size(proof, logged), lacking)
@@ -194,7 +203,7 @@ def _without_comparison(
     many, joints = len(recordings), f"{n} joint{'s' if n != 1 else ''}"
     diagnosis = rounded({
         "schema": SCHEMA, "verdict": "undecided", "findings": [], "unexplained": [],
-        "not_testable": not_testable(robot, set(), seen),
+        "not_testable": not_testable(robot, set(), seen, config.effects),
         "fit": {name: dict.fromkeys(columns) for name in robot.joint_names},
         "notes": said,
         "provenance": provenance(robot, recordings, config.options, config.words),
@@ -257,7 +266,8 @@ def _document(
     rest: list[Unexplained], missing: dict[int, str], seen: dict[Site, tuple[float, int]], said: list[str],
     origin: dict[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
-    fit = _fit(robot, proof, scatter)
+    fit, effects = _fit(robot, proof, scatter), [TORQUE_GAIN, *ex.lib.effects.values()]
+    titles = {effect.slug: effect.title for effect in effects}
     inertials = inertial_views(robot, ex)
     kind = verdict(ex, proof, found, rest, missing)
     sources = [r["file"] for r in origin["recordings"]]
@@ -266,11 +276,11 @@ def _document(
         "verdict": kind,
         "findings": found,
         "unexplained": [unexplained_entry(robot, u) for u in rest],
-        "not_testable": not_testable(robot, {f["effect"] for f in found}, seen),
+        "not_testable": not_testable(robot, {f["effect"] for f in found}, seen, effects),
         "fit": fit,
         "notes": said,
         "provenance": origin,
-        "summary": summary(kind, found, rest, fit, inertials, robot, sources, [*missing.values()]),
+        "summary": summary(kind, found, rest, fit, inertials, robot, sources, [*missing.values()], titles),
     })  # fmt: skip
 
 

@@ -4,9 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.effects.base import separating_motion
 from irb140_jax.mismatch import Proposal, Undecided
-from irb140_jax.mismatch.experiment_design.undecided import Pair
 from irb140_jax.mismatch.validation.testable import VISIBLE
 from irb140_jax.robot import Robot
 
@@ -23,8 +22,8 @@ def proposal_sentences(robot: Robot, open_: Undecided, proposal: Proposal) -> li
     """
     pieces = _listed([p.said(robot.joint_names) for p in proposal.pieces])
     lines = [f"{proposal.motion.t[-1]:.0f} s from rest to rest: {pieces}."]
-    for k, pair in enumerate(open_.pairs):
-        lines.append(_pair(robot, pair, proposal, k))
+    for k in range(len(open_.pairs)):
+        lines.append(_pair(robot, open_, proposal, k))
     lines += _hidden(robot, open_, proposal)
     if not open_.pairs and not open_.hidden:
         lines.append("The diagnosis left no question open. Every effect would be visible along this motion.")
@@ -36,16 +35,17 @@ def proposal_sentences(robot: Robot, open_: Undecided, proposal: Proposal) -> li
     return lines
 
 
-def _pair(robot: Robot, pair: Pair, proposal: Proposal, k: int) -> str:
+def _pair(robot: Robot, open_: Undecided, proposal: Proposal, k: int) -> str:
+    pair, effects = open_.pairs[k], open_.effects
     where = _listed([robot.joint_names[j] for j in pair.joints])
-    one, other = CATALOGUE[pair.named], CATALOGUE[pair.rival]
+    one, other = effects[pair.named], effects[pair.rival]
     either, now, odds = f"On {where}, {one.title} or {other.title}", proposal.odds_now[k], proposal.odds[k]
     if odds > SEPARATED:
         return (
             f"{either}: with this motion the log odds of the true one should reach {odds:.3g} at least; the recordings "
             f"alone give {now:.3g}."
         )
-    motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
+    motion = separating_motion(one, other)
     better = f"; this may separate them: {motion}" if motion else ""
     return f"{either}: none of the motions tried separates them, because {_why(proposal, k)}{better}."
 
@@ -67,7 +67,7 @@ def _hidden(robot: Robot, open_: Undecided, proposal: Proposal) -> Iterator[str]
     shown: dict[bool, dict[str, list[str]]] = {True: {}, False: {}}
     for c, z in zip(open_.hidden, proposal.seen, strict=True):
         column = open_.columns[c]
-        joints = "all joints" if column.effect.everywhere and len(column.joints) == robot.n else _listed(
+        joints = "all joints" if column.effect.place.everywhere and len(column.joints) == robot.n else _listed(
             [robot.joint_names[j] for j in column.joints])
         shown[z >= VISIBLE].setdefault(column.effect.title, []).append(joints)
     if shown[True]:

@@ -269,7 +269,7 @@ def without(lib: Library, columns: np.ndarray, amplitudes: np.ndarray) -> np.nda
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK)
 def _columns(effect, sites, shapes, motion):
-    per_shape = jax.vmap(partial(effect.columns, motion), in_axes=(None, 0))
+    per_shape = jax.vmap(partial(effect.law.columns, motion), in_axes=(None, 0))
     c = jax.vmap(per_shape)(sites, shapes)  # (S, G, T, m, k)
     return jnp.moveaxis(c, 2, 0).reshape(len(motion.t), -1)
 

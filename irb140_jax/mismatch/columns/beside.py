@@ -44,4 +44,4 @@ class Beside:
 
 
 def _absorbed(c: Candidate) -> set[str]:
-    return set(c.effect.contains) if c.effect.absorbs else set()
+    return set(c.effect.law.contains) if c.effect.law.absorbs else set()

@@ -10,7 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect, Scales
+from irb140_jax.effects import Effect, Scales
+from irb140_jax.mismatch.columns.loose_inertials import LOOSE_INERTIALS
 from irb140_jax.robot import Robot
 
 
@@ -27,7 +28,7 @@ class Candidate:
         lowest, highest: Admissible range of each.
     """
 
-    effect: AbstractEffect
+    effect: Effect
     joints: tuple[int, ...]
     shape: np.ndarray
     columns: np.ndarray
@@ -39,6 +40,11 @@ class Candidate:
     def slug(self) -> str:
         """The effect's name in the vocabulary."""
         return self.effect.slug
+
+    @property
+    def is_inertials(self) -> bool:
+        """Whether it is no left-out physics but a link whose inertials are wrong: never reported as a finding."""
+        return self.effect is LOOSE_INERTIALS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,16 +60,21 @@ class Library:
 
     robot: Robot
     candidates: tuple[Candidate, ...]
-    blocks: tuple[tuple[AbstractEffect, np.ndarray, np.ndarray, int], ...]
+    blocks: tuple[tuple[Effect, np.ndarray, np.ndarray, int], ...]
     size: int
+
+    @property
+    def effects(self) -> dict[str, Effect]:
+        """The effects by slug."""
+        return {effect.slug: effect for effect, *_ in self.blocks}
 
     @cached_property
     def entries(self) -> tuple[np.ndarray, np.ndarray]:
         """Joint and amplitude of every column that isn't zero throughout, in the order in which they are evaluated."""
         joints, amplitudes = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
         for effect, sites, shapes, first in self.blocks:
-            rows = np.tile(np.arange(self.robot.n), (len(sites), 1)) if effect.everywhere else sites
-            width = max(max(v) for v in effect.variants) + 1
+            rows = np.tile(np.arange(self.robot.n), (len(sites), 1)) if effect.place.everywhere else sites
+            width = effect.law.width
             S, G, m = len(sites), shapes.shape[1], rows.shape[1]
             amplitude = first + np.arange(S * G * width).reshape(S, G, 1, width)
             joints.append(np.broadcast_to(rows[:, None, :, None], (S, G, m, width)).ravel())
@@ -75,7 +86,7 @@ class Library:
         """Which of these columns are of laws of the log."""
         laws = np.zeros(self.size, dtype=bool)
         for effect, _, _, first in self.blocks:
-            laws[first:] = effect.logged > 0
+            laws[first:] = effect.place.at.in_log
         return laws[self.entries[1]]
 
     def spread(self, entries: np.ndarray, out: np.ndarray) -> None:
@@ -95,21 +106,22 @@ class Library:
         return out
 
 
-def library(robot: Robot, effects: Sequence[AbstractEffect], scales: Scales, *, scan: bool = False) -> Library:
+def library(robot: Robot, effects: Sequence[Effect], scales: Scales, *, scan: bool = False) -> Library:
     """Lay out the candidates of all effects at all sites, with their grids or, to `scan`, with the shapes of a scan."""
     blocks, candidates, first = [], [], 0
     for effect in effects:
-        sites = effect.sites(robot)
+        sites = effect.place.sites(robot)
         if len(sites) == 0:
             continue
-        shapes = np.stack([(effect.scan if scan else effect.shapes)(scales, joints) for joints in sites])
-        width = max(max(v) for v in effect.variants) + 1
+        grid = effect.shapes.scan if scan and effect.shapes.scan else effect.shapes.grid
+        shapes = np.stack([grid(scales, joints) for joints in sites])
+        width = effect.law.width
         blocks.append((effect, sites, shapes, first))
         for s, joints in enumerate(sites):
-            low, high = effect.lowest(robot, joints), effect.highest(robot, joints)
+            low, high = effect.bounds(robot, joints)
             for g in range(shapes.shape[1]):
                 base = first + (s * shapes.shape[1] + g) * width
-                for variant in effect.variants:
+                for variant in effect.law.variants:
                     v = np.array(variant)
                     candidates.append(
                         Candidate(effect, tuple(map(int, joints)), shapes[s, g], base + v, variant, low[v], high[v])
@@ -125,7 +137,7 @@ def reshaped(lib: Library, shapes: Sequence[np.ndarray]) -> Library:
     for c in lib.candidates:
         effect, sites, new, first = next(b for b in blocks if b[0] is c.effect)
         site = next(i for i, joints in enumerate(sites) if tuple(joints) == c.joints)
-        width = max(max(v) for v in effect.variants) + 1
+        width = effect.law.width
         position = (int(c.columns[0]) - c.variant[0] - first) // width - site * new.shape[1]
         candidates.append(dataclasses.replace(c, shape=new[site, position]))
     return dataclasses.replace(lib, candidates=tuple(candidates), blocks=blocks)

@@ -7,8 +7,8 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect
-from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.effects import At, Effect
+from irb140_jax.effects.torque_gain import EFFECT as TORQUE_GAIN
 from irb140_jax.mismatch.columns.along import Loads, Prepared, unbounded, without
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
 from irb140_jax.mismatch.inertials.consistent import consistent
@@ -27,7 +27,7 @@ class Named:
         shape: Shape parameters.
     """
 
-    effect: AbstractEffect
+    effect: Effect
     joints: tuple[int, ...]
     variant: tuple[int, ...]
     amplitudes: np.ndarray
@@ -35,7 +35,7 @@ class Named:
 
     def all_amplitudes(self) -> np.ndarray:
         """Amplitudes of every column of the effect, zero for those it doesn't use."""
-        full = np.zeros(max(max(v) for v in self.effect.variants) + 1)
+        full = np.zeros(self.effect.law.width)
         full[list(self.variant)] = self.amplitudes
         return full
 
@@ -52,21 +52,22 @@ def scaled(n: int, named: Sequence[Named], scale: float) -> tuple[Named, ...]:
     """
     if not scale:
         return tuple(named)
-    gain, out = CATALOGUE["torque_gain"], []
+    out = []
     for one in named:
-        if one.effect.friction:
+        if one.effect.place.is_friction:
             out.append(dataclasses.replace(one, amplitudes=one.amplitudes / (1.0 + scale)))
-        elif one.effect is not gain:
+        elif one.effect.slug != TORQUE_GAIN.slug:
             out.append(one)
-    own = {m.joints[0]: m.amplitudes[0] for m in named if m.effect is gain}
+    own = {m.joints[0]: m.amplitudes[0] for m in named if m.effect.slug == TORQUE_GAIN.slug}
     every = (np.array([scale + own.get(j, 0.0)]) for j in range(n))
-    return (*out, *(Named(gain, (j,), (0,), w, np.zeros(0)) for j, w in enumerate(every)))
+    return (*out, *(Named(TORQUE_GAIN, (j,), (0,), w, np.zeros(0)) for j, w in enumerate(every)))
 
 
 def as_named(robot: Robot, named: Sequence[Named]) -> Robot:
     """The robot with as much of the effects in its own numbers as those can hold."""
     for n in named:
-        robot = n.effect.in_model(robot, n.joints, n.all_amplitudes(), n.shape)
+        if n.effect.export.in_model:
+            robot = n.effect.export.in_model(robot, n.joints, n.all_amplitudes(), n.shape)
     return robot
 
 
@@ -125,27 +126,29 @@ def composed(
     columns = without(lib, columns, unbounded(lib, columns))
     shifted = along.torque_of(np.stack([dphi_refit, dphi_corrected], axis=1))
     load, inside = along.nominal + shifted[..., 1], along.motor_side
-    friction, logged = np.zeros_like(load), np.zeros((2, *load.shape))
+    friction, scales, shifts = np.zeros((3, *load.shape))
     for c, w in zip(lib.candidates, amplitudes, strict=True):
         part = lib.torque(columns, c.columns, w)
-        if c.effect.logged:
-            logged[c.effect.logged - 1] += part
-        elif c.effect.friction:
-            friction += part
-        else:
-            load = load + part
-            inside = inside + part if c.effect.transmission else inside
+        match c.effect.place.at:
+            case At.LOG_SCALE:
+                scales += part
+            case At.LOG_TIMING:
+                shifts += part
+            case At.FRICTION:
+                friction += part
+            case at:
+                load = load + part
+                inside = inside + part if at is At.DRIVE else inside
     total = load + friction
-    scaled, corrected = total + np.cumsum(logged, axis=0)
-    refit = along.nominal + shifted[..., 0]
-    return Torques(along.nominal, refit, Loads(load, total, load - inside, scaled), corrected)
+    loads = Loads(load, total, load - inside, total + scales)
+    return Torques(along.nominal, along.nominal + shifted[..., 0], loads, total + (scales + shifts))
 
 
 def library_of(robot: Robot, effects: Sequence[Named] | Sequence[Candidate]) -> Library:
     """A library of nothing but these effects, in their order."""
     blocks, candidates, first = [], [], 0
     for named in effects:
-        width = max(max(v) for v in named.effect.variants) + 1
+        width = named.effect.law.width
         blocks.append((named.effect, np.array([named.joints]), named.shape[None, None, :], first))
         candidates.append(
             Candidate(named.effect, named.joints, named.shape, first + np.array(named.variant), named.variant,

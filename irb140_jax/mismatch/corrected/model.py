@@ -1,16 +1,17 @@
 """The corrected model: nominal robot, refitted inertials, and the named effects with their parameters."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.effects import Effect
+from irb140_jax.effects.catalogue import known
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.columns.along import all_prepared, columns_along, seen_by
-from irb140_jax.mismatch.columns.loose_inertials import SILENT
 from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, composed, library_of
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.recordings.condition import Conditioned, condition
@@ -127,11 +128,14 @@ def to_json(model: CorrectedModel) -> dict[str, Any]:
     } | ({"drive": model.drive.to_json()} if model.drive else {})  # fmt: skip
 
 
-def from_json(data: dict[str, Any]) -> CorrectedModel:
-    """The inverse of `to_json`."""
+def from_json(data: dict[str, Any], effects: Sequence[Effect] = ()) -> CorrectedModel:
+    """The inverse of `to_json`; `effects` are those that are not in the catalogue.
+
+    Raises:
+        InputError: The model holds an effect that is neither among these nor in the catalogue.
+    """
     robot = data["robot"]
     leaves = {k: jnp.asarray(np.array(_infinite(v), dtype=float)) for k, v in robot["leaves"].items()}
-    known = CATALOGUE | SILENT
     return CorrectedModel(
         Robot(
             **leaves,  # pyright: ignore[reportArgumentType]: arrays only, static fields are named below
@@ -142,8 +146,8 @@ def from_json(data: dict[str, Any]) -> CorrectedModel:
         np.array(data["phi_corrected"]),
         tuple(
             Named(
-                known[e["effect"]], tuple(e["joints"]), tuple(e["variant"]), np.array(e["amplitudes"], dtype=float),
-                np.array(e["shape"], dtype=float),
+                known(e["effect"], effects), tuple(e["joints"]), tuple(e["variant"]),
+                np.array(e["amplitudes"], dtype=float), np.array(e["shape"], dtype=float),
             )
             for e in data["effects"]
         ),

@@ -69,9 +69,9 @@ def native_gap(beyond: Sequence[np.ndarray], band: Band) -> np.ndarray:
 
 
 def _page(model: CorrectedModel) -> str:
-    whole = [n for n in model.named if not n.effect.not_in_mjcf]
-    partly = [n for n in model.named if n.effect.not_in_mjcf and n.effect.mjcf]
-    without = [n for n in model.named if n.effect.not_in_mjcf and not n.effect.mjcf]
+    whole = [n for n in model.named if not n.effect.export.not_in_mjcf]
+    partly = [n for n in model.named if n.effect.export.not_in_mjcf and n.effect.export.mjcf]
+    without = [n for n in model.named if n.effect.export.not_in_mjcf and not n.effect.export.mjcf]
     lines = [
         f"# {XML}: {model.robot.name}, corrected",
         "",
@@ -92,5 +92,5 @@ def _page(model: CorrectedModel) -> str:
 def _line(model: CorrectedModel, named: Named) -> str:
     effect = named.effect
     joints = ", ".join(model.robot.joint_names[j] for j in named.joints)
-    words = [w for w in (effect.mjcf, effect.not_in_mjcf) if w]
+    words = [w for w in (effect.export.mjcf, effect.export.not_in_mjcf) if w]
     return f"- {effect.title} on {joints}: {'; '.join(words)}."

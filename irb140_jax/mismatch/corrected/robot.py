@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from irb140_jax.dynamics.chain import Plan, chain, plan
 from irb140_jax.dynamics.newton_euler import rigid_torque
-from irb140_jax.effects import AbstractEffect, Motion, RigidBody
+from irb140_jax.effects import At, Effect, Motion, RigidBody
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.columns.sensitivities import Sensitivities
 from irb140_jax.mismatch.columns.torques import better_known
@@ -34,7 +34,7 @@ class Acting(eqx.Module):
         shape: Shape parameters, shape (s,).
     """
 
-    effect: AbstractEffect = eqx.field(static=True)
+    effect: Effect = eqx.field(static=True)
     joints: tuple[int, ...] = eqx.field(static=True)
     amplitudes: Float[Array, " k"]
     shape: Float[Array, " s"]
@@ -80,10 +80,10 @@ class CorrectedRobot(AbstractPlant):
             InputError: An effect depends on what was before; use `inverse_dynamics_along`.
         """
         for a in self.effects:
-            if a.effect.history:
+            if a.effect.export.history:
                 raise InputError(
-                    f"inverse_dynamics: {a.effect.slug} {a.effect.history}, so its torque at a single instant is "
-                    "unknown: give the whole motion to inverse_dynamics_along"
+                    f"inverse_dynamics: {a.effect.slug} {a.effect.export.history}, so its torque at a single instant "
+                    "is unknown: give the whole motion to inverse_dynamics_along"
                 )
         return _torque(self, jnp.atleast_1d(jnp.asarray(t, float)), q[None], qd[None], qdd[None])[0]
 
@@ -126,15 +126,17 @@ class CorrectedRobot(AbstractPlant):
             InputError: An effect can't be simulated forward in time; the message says which and why.
         """
         for a in self.effects:
-            if a.effect.history and not a.effect.steps:
+            if a.effect.export.history and not a.effect.export.step:
                 raise InputError(
-                    f"simulation: {a.effect.slug} {a.effect.history} and can't be simulated forward in time; leave "
-                    f"it out with without('{a.effect.slug}')"
+                    f"simulation: {a.effect.slug} {a.effect.export.history} and can't be simulated forward in time; "
+                    f"leave it out with without('{a.effect.slug}')"
                 )
         still = jnp.zeros(self.n)
-        present = self.without(*(a.effect.slug for a in self.effects if a.effect.history))
+        present = self.without(*(a.effect.slug for a in self.effects if a.effect.export.history))
         load = present.inverse_dynamics(q, still, still)
-        return tuple(a.effect.memory(q[jnp.array(a.joints)], load[jnp.array(a.joints)]) for a in self.effects)
+        none = lambda q, tau: jnp.zeros(0)  # noqa: E731
+        at = [jnp.array(a.joints) for a in self.effects]
+        return tuple((a.effect.export.memory or none)(q[j], load[j]) for a, j in zip(self.effects, at, strict=True))
 
     def respond(
         self, memory: Memory, t: Scalar, q: Joints, qd: Joints, tau: Joints, dt: Scalar
@@ -144,11 +146,11 @@ class CorrectedRobot(AbstractPlant):
         after: list[Float[Array, " s"]] = []
         for a, held in zip(self.effects, memory, strict=True):
             joints = jnp.array(a.joints)
-            if not a.effect.history:
+            if not a.effect.export.step:
                 columns.append(None)
                 after.append(held)
                 continue
-            c, through, held = a.effect.step(held, q[joints], tau[joints], a.amplitudes, a.shape, dt)
+            c, through, held = a.effect.export.step(held, q[joints], tau[joints], a.amplitudes, a.shape, dt)
             tau = tau.at[joints].set(through)
             columns.append(c)
             after.append(held)
@@ -170,21 +172,23 @@ class CorrectedRobot(AbstractPlant):
 
     def summed(self, motion: Motion, base: JointSamples, stepped) -> tuple[JointSamples, ...]:
         """Load, total, carried and scaled torque (see `Loads`), and what is logged."""
-        friction, logged, load = jnp.zeros_like(base), [jnp.zeros_like(base)] * 2, base
+        friction, scales, shifts, load = *[jnp.zeros_like(base)] * 3, base
         inside = self.motor_side(motion.qd, motion.qdd)
         for k, a in enumerate(self.effects):
-            rows = jnp.arange(self.n) if a.effect.everywhere else jnp.array(a.joints)
+            rows = jnp.arange(self.n) if a.effect.place.everywhere else jnp.array(a.joints)
             given = None if stepped is None else stepped[k]
-            columns = a.effect.columns(motion, jnp.array(a.joints), a.shape) if given is None else given[None]
+            columns = a.effect.law.columns(motion, jnp.array(a.joints), a.shape) if given is None else given[None]
             part = jnp.zeros_like(base).at[:, rows].add(columns @ a.amplitudes)
-            if a.effect.logged:
-                logged[a.effect.logged - 1] += part
-            elif a.effect.friction:
-                friction += part
-            else:
-                load += part
-                inside += part if a.effect.transmission else 0.0
-        scales, shifts = logged
+            match a.effect.place.at:
+                case At.LOG_SCALE:
+                    scales += part
+                case At.LOG_TIMING:
+                    shifts += part
+                case At.FRICTION:
+                    friction += part
+                case at:
+                    load += part
+                    inside += part if at is At.DRIVE else 0.0
         total = load + friction
         return load, total, load - inside, total + scales, total + scales + shifts
 

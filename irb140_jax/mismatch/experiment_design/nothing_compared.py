@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects import Effect
 from irb140_jax.mismatch.columns.along import prepared, scales_of
 from irb140_jax.mismatch.columns.candidates import Candidate, library
 from irb140_jax.mismatch.experiment_design.undecided import UNKNOWN_NOISE, Column, Undecided
@@ -16,7 +16,7 @@ from irb140_jax.robot import Robot
 
 
 def all_open(
-    robot: Robot, effects: Sequence[AbstractEffect], smooth: Sequence[Conditioned], band: Band, uncertainty: float
+    robot: Robot, effects: Sequence[Effect], smooth: Sequence[Conditioned], band: Band, uncertainty: float
 ) -> tuple[Undecided, dict[Site, tuple[float, int]]]:
     """What is open where nothing was compared: every effect at every site.
 
@@ -35,12 +35,12 @@ def all_open(
     matters = reference(lib, scales, band.rate)
     shapes: dict[Site, list[Candidate]] = {}
     for c in lib.candidates:
-        if not (c.effect.scouts and not matters.amplitudes[c.columns].any()):  # see `testable.visibility`
+        if not (c.effect.shapes.scout and not matters.amplitudes[c.columns].any()):  # see `testable.visibility`
             shapes.setdefault((c.slug, c.joints), []).append(c)
     middle = [alike[len(alike) // 2] for alike in shapes.values()]
-    columns = tuple(Column(c.slug, c.joints, tuple(map(float, c.shape)), c.variant) for c in middle)
+    columns = tuple(Column(c.effect, c.joints, tuple(map(float, c.shape)), c.variant) for c in middle)
     amplitudes = np.concatenate([c.columns for c in middle])
-    typical = np.concatenate([np.full(len(c.columns), c.effect.typical) for c in middle])
+    typical = np.concatenate([np.full(len(c.columns), c.effect.prior.typical) for c in middle])
     scale = typical / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
     size = 10 * robot.n + len(amplitudes) + 1
     white = np.tile(np.eye(1, ORDER + 1), (robot.n, 1))

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.columns.along import prepared
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.mismatch.experiment_design.undecided import Pair, Sets, Undecided
@@ -146,13 +145,12 @@ def _library(robot: Robot, open_: Undecided) -> tuple[Library, np.ndarray]:
     """The effects in question as a library, and where its amplitudes stand in the order of `Undecided`."""
     blocks, start, place = [], {}, {}
     first = 0
-    for slug in dict.fromkeys(c.slug for c in open_.columns):
+    for slug, effect in open_.effects.items():
         mine = [k for k, c in enumerate(open_.columns) if c.slug == slug]
-        effect = CATALOGUE[slug]
         sites = np.array([open_.columns[k].joints for k in mine])
         shapes = np.array([[open_.columns[k].shape] for k in mine], dtype=float)
         blocks.append((effect, sites, shapes, first))
-        width = max(max(v) for v in effect.variants) + 1
+        width = effect.law.width
         place |= {k: first + i * width for i, k in enumerate(mine)}
         start[slug] = first
         first += len(mine) * width

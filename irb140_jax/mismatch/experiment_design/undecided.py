@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect, Scales
-from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.effects import Effect, Scales
+from irb140_jax.effects.catalogue import known
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gaussian import eliminated
 from irb140_jax.mismatch.regression.gram import LEVELS
@@ -27,21 +27,21 @@ class Column:
     """An effect at a site with a shape, of the few that matter to what is open.
 
     Attributes:
-        slug: The effect.
+        effect: The effect.
         joints: Indices of its joints.
         shape: Shape parameters.
         variant: Columns it uses.
     """
 
-    slug: str
+    effect: Effect
     joints: tuple[int, ...]
     shape: tuple[float, ...]
     variant: tuple[int, ...]
 
     @property
-    def effect(self) -> AbstractEffect:
-        """The effect itself."""
-        return CATALOGUE[self.slug]
+    def slug(self) -> str:
+        """The effect's name in the vocabulary."""
+        return self.effect.slug
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,6 +98,11 @@ class Undecided:
     band: Band
     scales: Scales
 
+    @property
+    def effects(self) -> dict[str, Effect]:
+        """The effects in question by slug."""
+        return {c.slug: c.effect for c in self.columns}
+
 
 def undecided(
     ex: Explanation, findings: Sequence[dict[str, Any]], seen: dict[Site, tuple[float, int]], matters: Reference,
@@ -115,8 +120,8 @@ def undecided(
     """
     names = ex.lib.robot.joint_names
     table = _Table(ex)
-    physics = tuple(c for c in ex.chosen if not ex.data.candidates[c].effect.silent)
-    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
+    physics = tuple(c for c in ex.chosen if not ex.data.candidates[c].is_inertials)
+    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].is_inertials)
     pairs = []
     for f in findings:
         site = tuple(names.index(j) for j in f["joints"])
@@ -155,7 +160,7 @@ class _Table:
     def columns(self) -> list[Column]:
         """The effects, in their new order."""
         picked = (self._candidates[i] for i in self._numbers)
-        return [Column(c.slug, c.joints, tuple(map(float, c.shape)), c.variant) for c in picked]
+        return [Column(c.effect, c.joints, tuple(map(float, c.shape)), c.variant) for c in picked]
 
     def of(self, indices) -> tuple[int, ...]:
         """New numbers of some candidates."""
@@ -184,7 +189,7 @@ class _Table:
         H = np.delete(np.delete(H, instrument, axis=0), instrument, axis=1)
         # What these recordings don't excite has no prior scale of theirs: that of lively motion stands in.
         typical = np.concatenate([np.zeros(0), *(
-            np.full(len(self._candidates[i].columns), self._candidates[i].effect.typical) for i in self._numbers
+            np.full(len(self._candidates[i].columns), self._candidates[i].effect.prior.typical) for i in self._numbers
         )])  # fmt: skip
         likely = typical / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
         scale = ex.data.scale[nuisances + amplitudes]
@@ -200,10 +205,10 @@ def _rival(ex: Explanation, at: int, slug: str) -> tuple[int, ...] | None:
     """The likeliest set with another effect in a finding's place, a special case of the finding beside it or not."""
     c = ex.data.candidates[at]
     rest = tuple(x for x in ex.chosen if x != at)
-    wider = CATALOGUE[slug].contains
+    wider = ex.lib.effects[slug].law.contains
     special = [
         i for i, o in enumerate(ex.data.candidates)
-        if o.slug in c.effect.contains and o.joints == c.joints and o.slug not in wider
+        if o.slug in c.effect.law.contains and o.joints == c.joints and o.slug not in wider
     ]  # fmt: skip
     best, found = -np.inf, None
     for beside in ((), *((s,) for s in special)):
@@ -219,7 +224,7 @@ def _rival(ex: Explanation, at: int, slug: str) -> tuple[int, ...] | None:
 def save_undecided(open_: Undecided, folder: pathlib.Path) -> None:
     """Write into an existing folder."""
     meta = {
-        "schema": SCHEMA, "columns": [dataclasses.asdict(c) for c in open_.columns], "chosen": open_.chosen,
+        "schema": SCHEMA, "columns": [_to_json(c) for c in open_.columns], "chosen": open_.chosen,
         "loose": open_.loose, "pairs": [dataclasses.asdict(p) for p in open_.pairs], "hidden": open_.hidden,
         "uncertainty": open_.uncertainty, "band": dataclasses.asdict(open_.band), "duration": open_.scales.duration,
     }  # fmt: skip
@@ -230,11 +235,22 @@ def save_undecided(open_: Undecided, folder: pathlib.Path) -> None:
     )  # fmt: skip
 
 
-def from_arrays(meta: dict[str, Any], arrays: dict[str, np.ndarray]) -> Undecided:
-    """The inverse of `save_undecided`, of what its file holds."""
+def _to_json(c: Column) -> dict[str, Any]:
+    return {"slug": c.slug, "joints": c.joints, "shape": c.shape, "variant": c.variant}
+
+
+def from_arrays(meta: dict[str, Any], arrays: dict[str, np.ndarray], effects: Sequence[Effect] = ()) -> Undecided:
+    """The inverse of `save_undecided`, of what its file holds; `effects` are those that are not in the catalogue.
+
+    Raises:
+        InputError: It holds an effect that is neither among these nor in the catalogue.
+    """
     sizes = {k: arrays[k] for k in Scales._fields if k != "duration"}
     return Undecided(
-        columns=tuple(Column(**{k: _tuples(v) for k, v in c.items()}) for c in meta["columns"]),
+        columns=tuple(
+            Column(known(c["slug"], effects), *(_tuples(c[k]) for k in ("joints", "shape", "variant")))
+            for c in meta["columns"]
+        ),
         pairs=tuple(Pair(**{k: _tuples(v) for k, v in p.items()}) for p in meta["pairs"]),
         chosen=_tuples(meta["chosen"]), loose=_tuples(meta["loose"]), hidden=_tuples(meta["hidden"]),
         gram=arrays["gram"], scale=arrays["scale"], reference=arrays["reference"], uncertainty=meta["uncertainty"],

@@ -53,7 +53,8 @@ def proof_in_motion(
         return None
     if follow.any():
         ready = {fold: dataclasses.replace(m, compiled=led(m.compiled, follow)) for fold, m in ready.items()}
-    lacking = list(dict.fromkeys(n.effect.title for m in ready.values() for n in m.model.named if n.effect.not_in_mjcf))
+    laws = [n.effect for m in ready.values() for n in m.model.named]
+    lacking = list(dict.fromkeys(law.title for law in laws if law.export.not_in_mjcf))
     names = (*MODELS, FILE) if lacking else MODELS
     applied = lambda name, w: leading(  # noqa: E731
         ready[w.fold].torque(name, recordings[w.recording].tau, missing[w.recording]), recordings[w.recording], follow

@@ -41,7 +41,7 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
     ]
     said = f"Besides the rigid-body model, a torque of {_listed(sizes)} is needed"
     said += f"; adding it removes {_percent(float(np.clip(gain, 0.0, 0.9999)))} of the squared error on unseen data"
-    if len(c.joints) == 1 and (c.effect.friction or c.slug in LEVELS):
+    if len(c.joints) == 1 and (c.effect.place.is_friction or c.slug in LEVELS):
         said += _mean_by_direction(robot, ex, c.joints[0], columns, w, cov)
     return said + "."
 

@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from irb140_jax.effects import AbstractEffect
-from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.columns.loose_inertials import SILENT
+from irb140_jax.effects import Effect
+from irb140_jax.effects.base import separating_motion
 from irb140_jax.mismatch.output.certain import certain
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.mismatch.selection.selected import NAMED
@@ -27,7 +26,7 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
     out, gains = [], held_out_gains(ex)
     for index, rows in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
         c = ex.data.candidates[index]
-        if c.effect.silent:
+        if c.is_inertials:
             continue
         values = parameters_of(robot, ex, index, w[rows], cov[rows, rows])
         names = ", ".join(robot.joint_names[j] for j in c.joints)
@@ -35,7 +34,7 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         out.append({
             "effect": c.slug,
             "joints": [robot.joint_names[j] for j in c.joints],
-            "where": c.effect.where(names, {k: v["value"] for k, v in values.items()}, units),
+            "where": c.effect.sentence(names, {k: v["value"] for k, v in values.items()}, units),
             "parameters": values,
             "evidence": {
                 "log_odds": _log_odds(ex, index),
@@ -85,9 +84,9 @@ def _log_odds(ex: Explanation, index: int) -> float:
     """Log posterior odds of a finding against the set without it; of friction also against ordinary friction."""
     c, rest = ex.data.candidates[index], ex.others(index)
     options = [rest]
-    if c.effect.friction and not c.effect.ordinary:
+    if c.effect.place.is_friction and not c.effect.prior.ordinary:
         taken = {(m.slug, m.joints) for m in ex.members}
-        usual = [i for i, o in enumerate(ex.data.candidates) if o.effect.ordinary and o.joints == c.joints]
+        usual = [i for i, o in enumerate(ex.data.candidates) if o.effect.prior.ordinary and o.joints == c.joints]
         options.append((*rest, *(i for i in usual if (ex.data.candidates[i].slug, c.joints) not in taken)))
     joints = list(c.joints)
     return ex.log_posterior(ex.chosen, joints) - max(ex.log_posterior(o, joints) for o in options)
@@ -95,27 +94,27 @@ def _log_odds(ex: Explanation, index: int) -> float:
 
 def _alternatives(ex: Explanation, index: int) -> list[dict[str, Any]]:
     """Effects that may be true in a finding's place, and what to record; a part of its law is no alternative to it."""
-    c = ex.data.candidates[index]
+    c, effects = ex.data.candidates[index], ex.lib.effects
     best: dict[str, float] = {}
     for (slug, _), p in ex.rivals(index).items():
-        if slug not in SILENT and slug != c.slug and p > LEAST_PROBABILITY:
+        if slug in effects and slug != c.slug and p > LEAST_PROBABILITY:
             best[slug] = max(best.get(slug, 0.0), p)
-    parts = {slug: p for slug, p in best.items() if slug in c.effect.contains}
+    parts = {slug: p for slug, p in best.items() if slug in c.effect.law.contains}
     others = {slug: p for slug, p in best.items() if slug not in parts}
     alone = {slug: p for slug, p in parts.items() if NAMED * p > sum(others.values())}
+    stays = [effects[slug] for slug in parts if slug not in alone]
     return [
         {
             "effect": slug, "probability": p,
-            "separate_by": _separation(c.effect, CATALOGUE[slug], [s for s in parts if s not in alone and s != slug]),
+            "separate_by": _separation(c.effect, effects[slug], [e for e in stays if e.slug != slug]),
         }
         for slug, p in sorted((others | alone).items(), key=lambda item: -item[1])
     ]  # fmt: skip
 
 
-def _separation(one: AbstractEffect, other: AbstractEffect, stays: list[str]) -> str:
-    motion = one.confused_with.get(other.slug) or other.confused_with.get(one.slug)
-    motion = motion or f"{one.needs}; and, for {other.title}, {other.needs}"
-    both = " and ".join(CATALOGUE[s].title for s in stays)
+def _separation(one: Effect, other: Effect, stays: list[Effect]) -> str:
+    motion = separating_motion(one, other) or f"{one.needs}; and, for {other.title}, {other.needs}"
+    both = " and ".join(s.title for s in stays)
     present = f" ({both} {'is' if len(stays) == 1 else 'are'} there in either case)" if stays else ""
     return f"Record {motion}{present}."
 

@@ -81,7 +81,7 @@ def _check_named(named: Named, n: int) -> None:
     slug = named.effect.slug
     if not named.joints or not set(named.joints) <= set(range(n)):
         raise ValueError(f"{slug}: joints {named.joints} of {n}")
-    if named.variant not in named.effect.variants:
+    if named.variant not in named.effect.law.variants:
         raise ValueError(f"{slug}: it has no columns {named.variant}")
     _check(f"{slug}: amplitudes", named.amplitudes, (len(named.variant),))
     _check(f"{slug}: shape", named.shape, (np.size(named.shape),))

@@ -2,9 +2,11 @@
 
 import json
 import pathlib
+from collections.abc import Sequence
 
 import numpy as np
 
+from irb140_jax.effects import Effect
 from irb140_jax.mismatch.corrected.model import SCHEMA, CorrectedModel, from_json, to_json
 from irb140_jax.mismatch.corrected.native import save_native
 from irb140_jax.mismatch.corrected.robot import CorrectedRobot, corrected_robot
@@ -28,27 +30,35 @@ def save(result: Result, folder: pathlib.Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def load_model(folder: str | pathlib.Path) -> CorrectedModel:
+def load_model(folder: str | pathlib.Path, effects: Sequence[Effect] = ()) -> CorrectedModel:
     """Read the corrected model of a diagnosis.
 
+    Args:
+        folder: Where the diagnosis was saved.
+        effects: What `DiagnoseConfig.effects` had beyond the catalogue.
+
     Raises:
-        InputError: The folder holds no whole diagnosis of this version.
+        InputError: The folder holds no whole diagnosis of this version, or an effect that is not known.
     """
     path = pathlib.Path(folder) / MODEL
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
         check_schema(data, SCHEMA)
-        check_model(model := from_json(data))
+        check_model(model := from_json(data, effects))
         return model
     except Exception as error:
         refuse(path, error)
 
 
-def load_undecided(folder: str | pathlib.Path) -> Undecided:
+def load_undecided(folder: str | pathlib.Path, effects: Sequence[Effect] = ()) -> Undecided:
     """Read what a diagnosis left open.
 
+    Args:
+        folder: Where the diagnosis was saved.
+        effects: What `DiagnoseConfig.effects` had beyond the catalogue.
+
     Raises:
-        InputError: The folder holds no whole diagnosis of this version.
+        InputError: The folder holds no whole diagnosis of this version, or an effect that is not known.
     """
     path = pathlib.Path(folder) / undecided.FILE
     try:
@@ -56,16 +66,20 @@ def load_undecided(folder: str | pathlib.Path) -> Undecided:
             arrays = dict(file)
         meta = json.loads(str(arrays.pop("meta")))
         check_schema(meta, undecided.SCHEMA)
-        check_undecided(open_ := undecided.from_arrays(meta, arrays))
+        check_undecided(open_ := undecided.from_arrays(meta, arrays, effects))
         return open_
     except Exception as error:
         refuse(path, error)
 
 
-def load_corrected(folder: str | pathlib.Path) -> CorrectedRobot:
+def load_corrected(folder: str | pathlib.Path, effects: Sequence[Effect] = ()) -> CorrectedRobot:
     """Read the corrected model of a diagnosis as dynamics in JAX: refitted inertials and the named effects.
+
+    Args:
+        folder: Where the diagnosis was saved.
+        effects: What `DiagnoseConfig.effects` had beyond the catalogue.
 
     Raises:
         InputError: The folder holds no readable diagnosis.
     """
-    return corrected_robot(load_model(folder))
+    return corrected_robot(load_model(folder, effects))

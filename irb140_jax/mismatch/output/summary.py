@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.inertials.consistent import consistent
 from irb140_jax.mismatch.regression.gaussian import eliminated, gain_of
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted
@@ -129,9 +128,12 @@ def unexplained_entry(robot: Robot, u: Unexplained) -> dict[str, Any]:
 
 def summary(
     kind: str, found: list[dict[str, Any]], rest: list[Unexplained], fit: dict[str, Any],
-    inertials: list[dict[str, Any]], robot: Robot, sources: list[str], missing: list[str],
+    inertials: list[dict[str, Any]], robot: Robot, sources: list[str], missing: list[str], titles: dict[str, str],
 ) -> str:  # fmt: skip
-    """A short paragraph for a person; `missing` are sentences on the data that a decision would need."""
+    """A short paragraph for a person; `missing` are sentences on the data that a decision would need.
+
+    Effects go by their titles, by slug.
+    """
     what = f"{len(sources)} recording{'s' if len(sources) != 1 else ''} of {robot.n} joint{'s' if robot.n != 1 else ''}"
     show = f"{what} show{'s' if len(sources) == 1 else ''}"
     parts = {
@@ -155,11 +157,11 @@ def summary(
     for effect, places in by_effect.items():
         one_joint_each = all(len(f["joints"]) == 1 for f in found if f["effect"] == effect)
         where = f"on {_listed(places)}" if one_joint_each else _listed([f"on {place}" for place in places])
-        said.append(f"{_capital(CATALOGUE[effect].title)} {where}.")
+        said.append(f"{_capital(titles[effect])} {where}.")
     for f in found:
         if f["alternatives"]:
-            title, joints = CATALOGUE[f["effect"]].title, _listed(f["joints"])
-            rivals = _listed([CATALOGUE[a["effect"]].title for a in f["alternatives"]], "or")
+            title, joints = titles[f["effect"]], _listed(f["joints"])
+            rivals = _listed([titles[a["effect"]] for a in f["alternatives"]], "or")
             said.append(
                 f"{_capital(title)} on {joints} may instead be {rivals}, in whole or in part; these data can't tell."
             )

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
-from irb140_jax.mismatch.columns.loose_inertials import LooseInertials
+from irb140_jax.mismatch.columns.loose_inertials import LOOSE_INERTIALS
 from irb140_jax.mismatch.regression.rows import Stretch
 
 LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
@@ -63,10 +63,10 @@ def prior_scale(lib: Library, stretches: list[Stretch], uncertainty: float, powe
     np.minimum.at(typical, amplitudes[seen], torque[joints[seen]] / rms[seen])
     typical[~np.isfinite(typical)] = 0.0
     for effect, sites, shapes, first in lib.blocks:
-        width = max(max(v) for v in effect.variants) + 1
-        typical[first : first + len(sites) * shapes.shape[1] * width] *= effect.typical
+        width = effect.law.width
+        typical[first : first + len(sites) * shapes.shape[1] * width] *= effect.prior.typical
     for c in lib.candidates:
-        if c.effect.tied:
+        if c.effect.prior.tied:
             moves = typical[c.columns] > 0.0
             typical[c.columns] = np.where(moves, np.min(typical[c.columns], where=moves, initial=np.inf), 0.0)
     return np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
@@ -74,8 +74,8 @@ def prior_scale(lib: Library, stretches: list[Stretch], uncertainty: float, powe
 
 def with_loose_inertials(lib: Library) -> tuple[Candidate, ...]:
     """The candidates of a library, and the inertials of each link as one more."""
-    loose, free, out = LooseInertials(), np.full(10, np.inf), list(lib.candidates)
+    free, out = np.full(10, np.inf), list(lib.candidates)
     for k in range(lib.robot.n):
         columns = lib.size + 10 * k + np.arange(10)
-        out.append(Candidate(loose, (k,), np.zeros(0), columns, tuple(range(10)), -free, free))
+        out.append(Candidate(LOOSE_INERTIALS, (k,), np.zeros(0), columns, tuple(range(10)), -free, free))
     return tuple(out)

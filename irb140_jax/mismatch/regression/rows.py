@@ -179,7 +179,7 @@ def with_candidates(
     bare: Stretch, chosen: Sequence[Candidate], along: Prepared, band: Band, loads: Loads | None, at: Point | None
 ) -> Stretch:
     """Rows with the columns of a few candidates."""
-    few = [c for c in chosen if not c.effect.silent]
+    few = [c for c in chosen if not c.is_inertials]
     lib = library_of(along.robot, few)
     dense = _dense(lib, along, bare.recording, band, loads, at)
     numbers = np.concatenate([*(c.columns for c in few), np.zeros(0, dtype=int)])

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect, LeftOver, Scales
+from irb140_jax.effects import Effect, LeftOver, Scales
 from irb140_jax.mismatch.columns.along import Prepared, without
 from irb140_jax.mismatch.columns.candidates import Library, library, reshaped
 from irb140_jax.mismatch.regression.assemble import Data, assembled
@@ -26,8 +26,8 @@ def scouted(
     Without it, the first search would explain a push or a wall by whatever else is in the library.
     """
     effects = [block[0] for block in lib.blocks]
-    ordinary = [e for e in effects if e.ordinary]
-    beside = [e for e in effects if any(e.slug in o.beside for o in effects)]
+    ordinary = [e for e in effects if e.prior.ordinary]
+    beside = [e for e in effects if any(e.slug in o.shapes.beside for o in effects)]
     plain = library(lib.robot, ordinary + beside, scales)
     data = assembled(plain, [stretch(plain, r, i, band, factor) for i, r in enumerate(along)], uncertainty)
     columns = np.arange(data.nuisances + library(lib.robot, ordinary, scales).size)
@@ -42,7 +42,7 @@ def scouted(
     best = _scanned(lib, along, band, scales, left_over(data, free, noise))
     shapes = [
         np.stack([
-            e.around(best[e.slug, tuple(joints)]) if (e.slug, tuple(joints)) in best
+            e.shapes.around(best[e.slug, tuple(joints)]) if e.shapes.around and (e.slug, tuple(joints)) in best
             else suggested(e, left, scales, joints, old[s]) for s, joints in enumerate(sites)
         ])
         for e, sites, old, _ in lib.blocks
@@ -54,7 +54,7 @@ def _scanned(
     lib: Library, along: Sequence[Prepared], band: Band, scales: Scales, left: LeftOver
 ) -> dict[tuple[str, tuple[int, ...]], np.ndarray]:
     """The best shape of each effect that has a scan, by effect and site."""
-    scanning = [e for e, sites, *_ in lib.blocks if len(e.scan(scales, sites[0]))]
+    scanning = [e for e, *_ in lib.blocks if e.shapes.scan]
     many = library(lib.robot, scanning, scales, scan=True)
     X = _thin_columns(many, along, band)
     left = left.every(THIN)
@@ -95,10 +95,10 @@ def _thin(rows: Sequence[int]) -> int:
 
 
 def suggested(
-    effect: AbstractEffect, left: LeftOver, scales: Scales, joints: np.ndarray, otherwise: np.ndarray
+    effect: Effect, left: LeftOver, scales: Scales, joints: np.ndarray, otherwise: np.ndarray
 ) -> np.ndarray:
     """The shapes that an effect finds in what is left, or else those it had."""
-    shapes = effect.scout(left, scales, joints) if effect.scouts else None
+    shapes = effect.shapes.scout(left, scales, joints) if effect.shapes.scout else None
     return otherwise if shapes is None else shapes
 
 

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax import dynamics
+from irb140_jax.effects import At
 from irb140_jax.mismatch.columns.along import Loads, Prepared, windows
 from irb140_jax.mismatch.columns.torques import Named, as_named
 from irb140_jax.robot import Robot
@@ -53,7 +54,7 @@ def point(robot: Robot, dphi: np.ndarray, named: Sequence[Named]) -> Point:
     """
     lean = [n for n in named if not np.array_equal(as_named(robot, [n]).gravity, robot.gravity)]
     leaning = eqx.tree_at(lambda r: r.gravity, robot, as_named(robot, lean).gravity) if lean else None
-    log = sorted((n for n in named if n.effect.logged), key=lambda n: n.effect.logged)
+    log = sorted((n for n in named if n.effect.place.at.in_log), key=lambda n: n.effect.place.at is At.LOG_TIMING)
     return Point(leaning, dphi, tuple(log), frozenset((n.effect.slug, n.joints) for n in (*lean, *log)))
 
 
@@ -84,12 +85,12 @@ def logged(at: Point, x: np.ndarray, joints: np.ndarray, dt: float) -> np.ndarra
         dt: Between samples [s].
     """
     for law in at.log:
-        at_law = np.flatnonzero((joints >= 0) & (np.isin(joints, law.joints) | law.effect.everywhere))
+        at_law = np.flatnonzero((joints >= 0) & (np.isin(joints, law.joints) | law.effect.place.everywhere))
         if not len(at_law):
             continue
         x = x.copy()
         for some in np.array_split(at_law, len(at_law) // AT_ONCE + 1):
-            x[:, some] += law.effect.passed_on(x[:, some], dt, law.all_amplitudes(), law.shape)
+            x[:, some] += _to_log(law, x[:, some], dt)
     return x
 
 
@@ -101,10 +102,15 @@ def counted_twice(at: Point, loads: Loads, dt: float) -> np.ndarray:
         loads: Of the explanation.
         dt: Between samples [s].
     """
-    sources = loads.total, loads.scaled
     out, every = np.zeros_like(loads.total), np.arange(loads.total.shape[1])
     for law in at.log:
-        on = every if law.effect.everywhere else np.array(law.joints)
-        source = sources[law.effect.logged - 1]
-        out[:, on] += law.effect.passed_on(source[:, on], dt, law.all_amplitudes(), law.shape)
+        on = every if law.effect.place.everywhere else np.array(law.joints)
+        source = loads.scaled if law.effect.place.at is At.LOG_TIMING else loads.total
+        out[:, on] += _to_log(law, source[:, on], dt)
     return out
+
+
+def _to_log(law: Named, x: np.ndarray, dt: float) -> np.ndarray:
+    if law.effect.law.to_log is None:
+        raise TypeError(f"{law.effect.slug} acts in the log, and its law has no `to_log`")
+    return law.effect.law.to_log(x, dt, law.all_amplitudes(), law.shape)

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg, special
 
+from irb140_jax.effects import At
 from irb140_jax.mismatch.columns.beside import Beside
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gaussian import posterior, root, with_prior
@@ -81,11 +82,11 @@ class Space:
 
     @cached_property
     def _dry(self) -> np.ndarray:
-        return np.array([DRY == c.slug or DRY in c.effect.contains for c in self.candidates], dtype=bool)
+        return np.array([DRY == c.slug or DRY in c.effect.law.contains for c in self.candidates], dtype=bool)
 
     @cached_property
     def _late(self) -> np.ndarray:
-        return np.array([c.effect.logged > 1 for c in self.candidates])
+        return np.array([c.effect.place.at is At.LOG_TIMING for c in self.candidates])
 
     @cached_property
     def places(self) -> tuple[np.ndarray, ...]:

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from irb140_jax.effects import AbstractEffect
+from irb140_jax.effects import Effect
 from irb140_jax.mismatch.columns.along import Loads, Prepared, all_prepared, columns_along, scales_of, seen_by
 from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, composed, library_of
@@ -48,7 +48,7 @@ def explain(
     robot: Robot,
     recordings: Sequence[Conditioned],
     band: Band,
-    effects: Sequence[AbstractEffect],
+    effects: Sequence[Effect],
     uncertainty: float,
     sensors: np.ndarray,
     progress: Callable[[str], None] = lambda _: None,
@@ -128,7 +128,7 @@ def _first_noise(
     extra: Sequence[Nuisances],
 ) -> Noise:  # fmt: skip
     """Noise before anything is explained: what ordinary friction and a free discrepancy leave."""
-    usual = library_of(lib.robot, [c for c in lib.candidates if c.effect.ordinary])
+    usual = library_of(lib.robot, [c for c in lib.candidates if c.effect.prior.ordinary])
     held = [with_library(s, usual, r, band) for s, r in zip(rows, along, strict=True)]
     return flexible_noise(assembled(usual, held, uncertainty), extra)
 
@@ -187,10 +187,11 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
         for s, joints in enumerate(sites):
             mine = [i for i in best if (ex.data.candidates[i].slug, ex.data.candidates[i].joints)
                     == (effect.slug, tuple(joints))]  # fmt: skip
-            if mine and effect.refines():
+            if mine and effect.shapes.finer:
                 best[mine[0]], peak = _peak(ex, mine[0])
-                new[s] = effect.finer(old[s], effect.shape_of(amplitudes[mine[0]], peak))
-            elif effect.scouts and not mine:
+                follows = effect.shapes.follows or (lambda _, shape: shape)
+                new[s] = effect.shapes.finer(old[s], follows(amplitudes[mine[0]], peak))
+            elif effect.shapes.scout and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)
     refined = reshaped(ex.lib, shapes)
@@ -204,7 +205,7 @@ def _coarse(ex: Explanation, left: Noise) -> bool:
         ex: The explanation.
         left: Noise that it leaves.
     """
-    shaped = [j for m in ex.members if m.effect.refines() for j in m.joints]
+    shaped = [j for m in ex.members if m.effect.shapes.finer for j in m.joints]
     was, now = (np.sqrt(np.mean(noise.total**2, axis=0)) for noise in (ex.noise, left))
     return bool(np.any(np.abs(np.log(now / was))[shaped] > SETTLED))
 
@@ -214,7 +215,7 @@ def _peak(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
     mine = ex.data.candidates[index]
     grid, odds = _grid_of(ex, index)
     best = grid[np.argmax(odds)] if np.isfinite(odds).any() else mine.shape
-    return best, mine.effect.peak(grid, best, odds)
+    return best, mine.effect.shapes.peak(grid, best, odds)
 
 
 def _grid_of(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
@@ -227,7 +228,7 @@ def _grid_of(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _same(c: Candidate, shape: np.ndarray, index: int, lib: Library) -> int:
     """The candidate of a library nearest to a shape of one before; loose inertials keep their place at the end."""
-    if c.slug == "inertials":
+    if c.is_inertials:
         return index
     site = (c.slug, c.joints, c.variant)
     alike = [i for i, o in enumerate(lib.candidates) if (o.slug, o.joints, o.variant) == site]

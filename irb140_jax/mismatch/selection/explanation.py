@@ -157,7 +157,7 @@ class Explanation:
         into[:, :size] = np.diag(self.data.scale[:size])
         for c in (self.data.candidates[i] for i in chosen):
             own = first + np.arange(len(c.columns))
-            if c.slug == "inertials":
+            if c.is_inertials:
                 rows = (10 * np.array(c.joints)[:, None] + np.arange(10)).ravel()
                 into[rows, own] = self.data.scale[self.data.nuisances + c.columns]
             first += len(own)
@@ -188,7 +188,7 @@ def fitted(
     dphi, members, amplitudes = factor @ w[: data.nuisances], [], []
     for i, part in zip(chosen, parts(data, chosen), strict=True):
         c = data.candidates[i]
-        if c.slug == "inertials":
+        if c.is_inertials:
             rows = (10 * np.array(c.joints)[:, None] + np.arange(10)).ravel()
             dphi = dphi + factor[:, rows] @ w[part]
         else:

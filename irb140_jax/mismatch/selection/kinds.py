@@ -50,7 +50,7 @@ def kinds_of(candidates: Sequence[Candidate], expected: float) -> Kinds:
     """Kinds of effects, each at about so many sites; ordinary friction is anywhere by itself."""
     sites: dict[str, set[tuple[int, ...]]] = {}
     for c in candidates:
-        if not c.effect.ordinary:
+        if not c.effect.prior.ordinary:
             sites.setdefault(c.slug, set()).add(c.joints)
     number = {slug: k for k, slug in enumerate(sites)}
     return Kinds(

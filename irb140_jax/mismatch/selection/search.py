@@ -50,7 +50,7 @@ class Search:
             chosen: Where it starts.
             every_move: Whether to try more than to add and to remove.
         """
-        now = frozenset(chosen or (i for i, c in enumerate(self.space.candidates) if c.effect.ordinary))
+        now = frozenset(chosen or (i for i, c in enumerate(self.space.candidates) if c.effect.prior.ordinary))
         self.judged(now, self.start)
         moves: tuple[Callable[[frozenset[int]], frozenset[int]], ...] = (
             self._added, self._removed, self._exchanged, self._on_all_joints, self._ordinary,
@@ -194,8 +194,9 @@ class Search:
         """Special cases of laws, and ordinary friction in the place of any friction."""
         out = []
         for law in map(self._of, members):
+            rubs, special = law.effect.place.is_friction, law.effect.law.contains
             out += [i for i, c in enumerate(self.space.candidates) if c.joints == law.joints and i not in members
-                    and (c.slug in law.effect.contains or (c.effect.ordinary and law.effect.friction))]  # fmt: skip
+                    and (c.slug in special or (rubs and c.effect.prior.ordinary))]  # fmt: skip
         return sorted(set(out))
 
     def _together(self, one: int, other: int) -> bool:
@@ -209,7 +210,7 @@ class Search:
         """A kind on every joint at once; another, or one effect of all joints, in the place of all of a kind."""
         space = self.space
         tries: list[tuple[frozenset[int], None]] = []
-        kinds = [self._of(m).slug for m in now if len(self._of(m).joints) == 1 and not self._of(m).effect.ordinary]
+        kinds = [c.slug for c in map(self._of, now) if len(c.joints) == 1 and not c.effect.prior.ordinary]
         for slug in dict.fromkeys(kinds):
             scored = [self._scored_anew(now, j) for j in range(len(space.joints))]
             each = [next((i for _, i in at if self._of(i).slug == slug), None) for at in scored]
@@ -232,8 +233,8 @@ class Search:
         """Ordinary friction for all friction of a joint."""
         tries = []
         for j in range(len(self.space.joints)):
-            rubs = {m for m in now if self._of(m).effect.friction and self._of(m).joints == (j,)}
-            usual = {i for i in self._sites[j] if self._of(i).effect.ordinary and self._of(i).joints == (j,)}
+            rubs = {m for m in now if self._of(m).effect.place.is_friction and self._of(m).joints == (j,)}
+            usual = {i for i in self._sites[j] if self._of(i).effect.prior.ordinary and self._of(i).joints == (j,)}
             tries += [(now - rubs | usual, [j]), *((now - rubs | {i}, [j]) for i in usual)]
         return self._best(now, tries)
 

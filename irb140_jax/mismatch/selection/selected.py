@@ -67,7 +67,7 @@ def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:
         extra: Nuisance columns, one per recording.
     """
     n = data.stretches[0].y.shape[1]
-    usual = [data.nuisances + c.columns for c in data.candidates if c.effect.ordinary]
+    usual = [data.nuisances + c.columns for c in data.candidates if c.effect.prior.ordinary]
     shared = np.concatenate([np.arange(data.nuisances), *usual])
     residuals, dof = [np.zeros_like(s.y) for s in data.stretches], np.zeros(n)
     for j in range(n):

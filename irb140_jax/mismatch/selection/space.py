@@ -36,16 +36,16 @@ def space_of(
         s, k = data.scale[data.nuisances + c.columns], len(c.columns)
         unit = np.where(s > 0.0, s, 1.0)
         # What is there only if it is more than nothing, but moves nothing here, can't be found.
-        unseen = (s == 0.0) & (c.lowest == 0.0) | (c.effect.once and _throughout(data, c))
+        unseen = (s == 0.0) & (c.lowest == 0.0) | _throughout(data, c)
         low, high = c.lowest, c.highest
         if settled:
-            low = np.where(np.isin(c.variant, c.effect.own), np.maximum(low, c.effect.settled), low)
-        if len(c.shape) and (s > 0.0).all():
-            at_least, at_most = c.effect.at_shape(c.shape)
+            low = np.where(np.isin(c.variant, c.effect.law.own), np.maximum(low, c.effect.shapes.settled), low)
+        if c.effect.prior.at_shape and (s > 0.0).all():
+            at_least, at_most = c.effect.prior.at_shape(c.shape)
             low = np.maximum(low, at_least[list(c.variant)])
             high = np.minimum(high, at_most[list(c.variant)])
         lowest[i, :k], highest[i, :k] = np.where(unseen, np.inf, low / unit), high / unit
-        if c.effect.adds_up:
+        if c.effect.prior.adds_up:
             weights[i, :k], least[i] = s, c.lowest[0]
     return Space(
         joints, candidates, data.nuisances, data.nuisances + common, len(data.scale) + common,
@@ -65,16 +65,16 @@ def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
     }
 
     def rare(c: Candidate) -> float:
-        alike, prior = kinds[c.slug, c.joints], -np.log(c.effect.scanned)
-        if c.effect.shape_follows:
+        alike, prior = kinds[c.slug, c.joints], -np.log(c.effect.shapes.scanned)
+        if c.effect.shapes.follows and (at_shape := c.effect.prior.at_shape):
             # No parameter of its own: those that some amplitude may have share its prior, half either side of zero.
-            least, most = np.array([o.effect.at_shape(o.shape) for o in alike])[:, :, 0].T
-            middle = np.mean(c.effect.at_shape(c.shape))
+            least, most = np.array([at_shape(o.shape) for o in alike])[:, :, 0].T
+            middle = np.mean(at_shape(c.shape))
             return float(prior - np.log(2.0 * np.sum((least <= middle) & (middle < most))))
         return float(prior - np.log(len(alike))) + narrowed.get((c.slug, c.joints), 0.0)
 
     usual = np.log(COMMON / (1.0 - COMMON))
-    return np.array([usual if c.effect.ordinary else rare(c) for c in data.candidates])
+    return np.array([usual if c.effect.prior.ordinary else rare(c) for c in data.candidates])
 
 
 def _narrowed(grid: np.ndarray, first: np.ndarray) -> float:
@@ -93,7 +93,9 @@ def _narrowed(grid: np.ndarray, first: np.ndarray) -> float:
 
 def _throughout(data: Data, c: Candidate) -> bool:
     """Whether what should happen once neither begins nor ends while it is recorded."""
-    recording, begins, ends = c.effect.during(c.shape)
+    if c.effect.shapes.during is None:
+        return False
+    recording, begins, ends = c.effect.shapes.during(c.shape)
     seen = [s.t[np.any(s.use, axis=1)] - s.begin for s in data.stretches if s.recording == recording]
     t = np.concatenate([*seen, np.zeros(0)])
     return len(t) == 0 or (begins < t[0] + EVENT and ends > t[-1] - EVENT)

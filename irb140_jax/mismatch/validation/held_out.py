@@ -140,7 +140,7 @@ class Refit:
 
 def refitted(ex: Explanation) -> Refit:
     """Refit the inertials beside an explanation."""
-    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].slug == "inertials")
+    loose = tuple(c for c in ex.chosen if ex.data.candidates[c].is_inertials)
     columns = ex.columns(loose)
     stretches = [s.of_rigid_body() for s in ex.data.stretches]
     scale, prior = ex.data.scale[columns], np.ones(len(columns))
@@ -238,5 +238,5 @@ def _only_here(ex: Explanation, chosen: tuple[int, ...], energy: np.ndarray, fol
     """Columns of members that only this fold can tell of: they happen once, or nearly all of their torque is in it."""
     members = [ex.data.candidates[i] for i in chosen]
     alone = energy[:, fold].sum(axis=1) > ALONE * energy.sum(axis=1)
-    each = [np.full(len(c.columns), c.effect.once or a) for c, a in zip(members, alone, strict=True)]
+    each = [np.full(len(c.columns), c.effect.shapes.once or a) for c, a in zip(members, alone, strict=True)]
     return np.concatenate([np.zeros(ex.data.nuisances, dtype=bool), *each])

@@ -37,21 +37,21 @@ def parameters_of(
     value = _physical(c, w)
     over_shapes = np.maximum(_variance_over_shapes(ex, index, value), _variance_about_shape(ex, index, w))
     w, cov = _of_all_columns(ex, index, w, cov)
-    physical = lambda w: np.asarray(c.effect.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
+    physical = lambda w: np.asarray(c.effect.law.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
     variance = _variance_of(physical, w, cov, value) + over_shapes
     variance = variance + _variance_over_variants(ex, index, value)
-    if c.effect.leans_on_inertials:
+    if c.effect.prior.of_rigid_body:
         variance = variance + (value * _inertial_doubt(ex, c)) ** 2
-    if c.effect.scouts:
-        alike = c.effect.alike(left_over(ex.data, np.zeros(0, dtype=int), ex.noise.total), w, c.shape)
+    if c.effect.shapes.alike:
+        alike = c.effect.shapes.alike(left_over(ex.data, np.zeros(0, dtype=int), ex.noise.total), w, c.shape)
         variance = variance + np.sum((alike - value) ** 2, axis=0) / 2.0
     slide = robot.is_slide[c.joints[0]]
     return {
         parameter.name: {
             "value": float(value[i]), "std": float(np.sqrt(max(variance[i], 0.0))),
-            "unit": c.effect.unit(parameter, slide),
+            "unit": parameter.unit_of(slide),
         }
-        for i, parameter in enumerate(c.effect.parameters)
+        for i, parameter in enumerate(c.effect.law.parameters)
     }  # fmt: skip
 
 
@@ -76,7 +76,7 @@ def _of_all_columns(ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray)
     Of a vector's components those that move nothing are zero, too, give or take `UNSEEN` times what the others are.
     """
     c = ex.data.candidates[index]
-    width = max(max(v) for v in c.effect.variants) + 1
+    width = c.effect.law.width
     columns = c.columns[0] - c.variant[0] + np.arange(width)
     H = ex.near(ex.chosen, columns)
     scale = ex.data.scale[ex.data.nuisances + columns]
@@ -86,16 +86,16 @@ def _of_all_columns(ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray)
     spread[used] = spread[:, used] = 0.0
     spread[np.ix_(used, used)] = cov
     unseen = scale == 0.0
-    if c.effect.vector and unseen.any() and not unseen.all():
+    if c.effect.prior.vector and unseen.any() and not unseen.all():
         spread[unseen, unseen] = UNSEEN**2 * np.mean(full[~unseen] ** 2)
     return full, spread
 
 
 def _physical(c: Candidate, w: np.ndarray) -> np.ndarray:
     """Physical parameters from the amplitudes that a candidate uses."""
-    full = np.zeros(max(max(v) for v in c.effect.variants) + 1)
+    full = np.zeros(c.effect.law.width)
     full[list(c.variant)] = w
-    return np.asarray(c.effect.physical(jnp.asarray(full), jnp.asarray(c.shape)))
+    return np.asarray(c.effect.law.physical(jnp.asarray(full), jnp.asarray(c.shape)))
 
 
 def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.
         value: Its physical parameters.
     """
     c = ex.data.candidates[index]
-    if not c.effect.refines():
+    if not c.effect.shapes.finer:
         return np.zeros(len(value))
     alike = [
         i
@@ -130,7 +130,8 @@ def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.
     # A posterior narrower than the grid is known to the grid's spacing.
     spacing = np.min(np.where(steps > 1e-9 * np.abs(value), steps, np.inf), axis=0, initial=np.inf)
     spacing = np.where(np.isfinite(spacing), spacing, 0.0)
-    return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + c.effect.blur(c.shape) ** 2
+    blur = c.effect.shapes.blur(c.shape) if c.effect.shapes.blur else 0.0
+    return np.maximum(np.maximum(between, beyond), spacing**2 / 12.0) + blur**2
 
 
 def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray) -> np.ndarray:
@@ -148,8 +149,8 @@ def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray) -> np.ndar
     alike = [o for o in data.candidates if (o.slug, o.joints, o.variant) == (c.slug, c.joints, c.variant)]
     directions = nearest_in_each_direction(np.array([o.shape for o in alike]), c.shape)
     near = [alike[points[0]] for points in directions]
-    if not (c.effect.refines() and near):
-        return np.zeros(len(c.effect.parameters))
+    if not (c.effect.shapes.finer and near):
+        return np.zeros(len(c.effect.law.parameters))
     columns = np.concatenate([c.columns, *(o.columns for o in near)])
     scale, k = data.scale[data.nuisances + columns], len(w)
     per_scale = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0.0)  # zero: it moves nothing

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from scipy import ndimage
 
-from irb140_jax.effects import AbstractEffect, Scales
-from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.effects import Effect, Scales
 from irb140_jax.mismatch.columns.along import columns_along, prepared, unbounded, without
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.mismatch.regression.gaussian import eliminated
@@ -29,7 +28,7 @@ class AtSite(Protocol):
     """An effect at a site: a candidate, or what is kept of one."""
 
     @property
-    def effect(self) -> AbstractEffect: ...  # noqa: D102
+    def effect(self) -> Effect: ...  # noqa: D102
 
     @property
     def joints(self) -> tuple[int, ...]: ...  # noqa: D102
@@ -74,19 +73,21 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
     effects = without(lib, effects, unbounded(lib, effects))
     torque, amplitudes = np.sqrt(np.mean(along.nominal**2, axis=0)), np.zeros(lib.size)
     for effect, sites, shapes, first in lib.blocks:
-        width = max(max(v) for v in effect.variants) + 1
-        own = np.arange(width)[list(effect.own)]
-        together = [(own, effect.likely(lib.robot)), *(([k], [1.0]) for k in range(width) if k not in own)]
+        width = effect.law.width
+        own = np.arange(width)[list(effect.law.own)]
+        bounds = [effect.bounds(lib.robot, joints)[1] for joints in sites]
+        together = [(own, effect.prior.proportion or [1.0] * len(own))]
+        together += [([k], [1.0]) for k in range(width) if k not in own]
         for k in range(len(sites) * shapes.shape[1]):
             # Of the joints it acts on: all of them, for effects that act everywhere.
-            joints = slice(None) if effect.everywhere else sites[k // shapes.shape[1]]
+            joints = slice(None) if effect.place.everywhere else sites[k // shapes.shape[1]]
             for part, likely in together:
                 columns = first + k * width + np.asarray(part)
                 power = np.mean(lib.torque(effects, columns, np.asarray(likely)) ** 2, axis=0).sum()
                 if power > 0.0:
                     amplitudes[columns] = np.asarray(likely) * REFERENCE_SHARE * np.linalg.norm(torque[joints])
                     amplitudes[columns] /= np.sqrt(power)
-                    most = effect.highest(lib.robot, sites[k // shapes.shape[1]])[part]
+                    most = bounds[k // shapes.shape[1]][part]
                     amplitudes[columns] *= np.min(np.minimum(most / np.maximum(amplitudes[columns], 1e-300), 1.0))
     return Reference(amplitudes, torque)
 
@@ -119,9 +120,9 @@ def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, i
     H = ex.near(ex.chosen, np.arange(len(ex.data.scale) - ex.data.nuisances))
     seen: dict[Site, tuple[float, int]] = {}
     for i, c in enumerate(ex.data.candidates):
-        if c.effect.silent or any(_related(c, m) for m in ex.members):
+        if c.is_inertials or any(_related(c, m) for m in ex.members):
             continue
-        if c.effect.scouts and not matters.amplitudes[c.columns].any():
+        if c.effect.shapes.scout and not matters.amplitudes[c.columns].any():
             continue  # a wall or a push at no place or time in particular
         scale = ex.data.scale[ex.data.nuisances + c.columns]
         strength = matters.in_prior_units(c.columns, scale)
@@ -144,10 +145,10 @@ def stands_out(
         members: The named effects.
     """
     effect = candidate.effect
-    own = np.arange(len(columns))[list(effect.own)]
-    simple = set(effect.contains)
+    own = np.arange(len(columns))[list(effect.law.own)]
+    simple = set(effect.law.contains)
     # A named law at the site that is or has the special case is eliminated already.
-    there = any(m.joints == candidate.joints and simple & {m.effect.slug, *m.effect.contains} for m in members)
+    there = any(m.joints == candidate.joints and simple & {m.effect.slug, *m.effect.law.contains} for m in members)
     special = np.zeros(0, dtype=int) if there or not simple else np.delete(np.arange(len(columns)), own)
     left, _ = eliminated(H[np.ix_(columns, columns)], special)
     size = strength[own] @ left[np.ix_(own, own)] @ strength[own]
@@ -157,17 +158,20 @@ def stands_out(
 def _related(one: AtSite, member: AtSite) -> bool:
     """Whether an effect is a named one or a part of it."""
     a, b = one.effect, member.effect
-    return one.joints == member.joints and (a.slug == b.slug or a.slug in b.contains)
+    return one.joints == member.joints and (a.slug == b.slug or a.slug in b.law.contains)
 
 
-def not_testable(robot: Robot, found: set[str], seen: dict[Site, tuple[float, int]]) -> list[dict[str, Any]]:
+def not_testable(
+    robot: Robot, found: set[str], seen: dict[Site, tuple[float, int]], effects: Sequence[Effect]
+) -> list[dict[str, Any]]:
     """Effects that this motion could not have shown, with the joints where that is so, as the contract has them."""
+    needs = {effect.slug: effect.needs for effect in effects}
     blind: dict[str, set[int]] = {}
     for (slug, joints), (z, _) in seen.items():
         if z < VISIBLE and slug not in found:
             blind.setdefault(slug, set()).update(joints)
     return [
         {"effect": slug, "joints": [robot.joint_names[j] for j in sorted(joints)],
-         "needs": f"Needs {CATALOGUE[slug].needs}."}
+         "needs": f"Needs {needs[slug]}."}
         for slug, joints in sorted(blind.items())
     ]  # fmt: skip
