@@ -62,7 +62,7 @@ def test_a_diagnosis_names_the_new_effect_where_mujoco_hid_it(extended, monkeypa
     law = {"coefficient": 0.6, "exponent": 2.0}
     hidden = Concealment("nonlinear_viscous_friction", ("joint1",), parameters=law)
     case = conceal(xml, [hidden], three_motions(robot, 10.0, 500.0, seed=6), seed=6)
-    result = diagnose(robot, case.recordings, DiagnoseConfig(effects=tuple(CATALOGUE.values()))).diagnosis
+    result = diagnose(robot, case.recordings, DiagnoseConfig(effects=tuple(CATALOGUE.values()))).diagnosis.to_json()
     assert [(f["effect"], f["joints"]) for f in result["findings"]] == [("quadratic_drag", ["joint1"])]
     drag = result["findings"][0]["parameters"]["drag"]
     assert drag["value"] == pytest.approx(0.6, abs=max(0.06, 4.0 * drag["std"]))

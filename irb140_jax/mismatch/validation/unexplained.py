@@ -34,7 +34,7 @@ NEARLY = 2.0 / 3.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Unexplained:
+class Structure:
     """What is left at one joint.
 
     Attributes:
@@ -88,7 +88,7 @@ class Rows(NamedTuple):
         return np.concatenate([a[p] for a, p in zip(arrays, self.pick, strict=True)])
 
 
-def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
+def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
     """Joints whose residual, findings taken off, can be predicted on unseen data."""
     out = []
     torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
@@ -111,7 +111,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
             p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
             if share >= least and p <= SIGNIFICANT:
                 size = float(np.sqrt(share) * rmse[j])
-                out.append(Unexplained(j, share, p, rivals[best].variable, size))
+                out.append(Structure(j, share, p, rivals[best].variable, size))
                 break
     return out
 
