@@ -56,7 +56,7 @@ def summary(
     inertials: Sequence[LinkShift], robot: Robot, recordings: int, missing: Iterable[str],
 ) -> str:  # fmt: skip
     """A short paragraph for a person; `missing` are sentences on the data that a decision would need."""
-    what = compared(recordings, robot)
+    what = _counted(recordings, robot)
     show = f"{what} show{'s' if recordings == 1 else ''}"
     parts = {
         "no_mismatch": (
@@ -113,7 +113,7 @@ def _worst_error(robot: Robot, found: Sequence[Finding], fit: dict[str, Fit]) ->
     )
 
 
-def compared(recordings: int, robot: Robot) -> str:
+def _counted(recordings: int, robot: Robot) -> str:
     """How many recordings and joints there are, in words."""
     many = f"{recordings} recording{'s' if recordings != 1 else ''}"
     return f"{many} of {robot.n} joint{'s' if robot.n != 1 else ''}"
@@ -121,7 +121,7 @@ def compared(recordings: int, robot: Robot) -> str:
 
 def open_sentence(recordings: int, robot: Robot) -> str:
     """What the summary of an undecided diagnosis begins with."""
-    return f"{compared(recordings, robot)} can't tell whether the model leaves anything out."
+    return f"{_counted(recordings, robot)} can't tell whether the model leaves anything out."
 
 
 def _capital(words: str) -> str:
