@@ -148,7 +148,7 @@ def diagnosed(robot: Robot, case: ConcealedCase, motions: Sequence[Excitation], 
 
 def told(result: Result, truth: dict) -> dict:
     """The part of a diagnosis that is judged."""
-    d = result.diagnosis
+    d = result.diagnosis.to_json()
     return {
         "state": state(d, truth), "verdict": d["verdict"],
         "found": [

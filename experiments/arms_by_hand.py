@@ -160,7 +160,7 @@ KINDS = {
 
 def judged(kind: str, seed: int) -> dict:
     arm, robot, recordings, truth = KINDS[kind][0](seed)
-    d = diagnose(robot, recordings).diagnosis
+    d = diagnose(robot, recordings).diagnosis.to_json()
     return {
         "seed": seed, "arm": arm, "truth": truth, "found": d["findings"], "unexplained": d["unexplained"],
         "verdict": d["verdict"], "fit": d["fit"], "exact": {*map(key, d["findings"])} == {*map(key, truth)},

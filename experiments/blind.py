@@ -74,7 +74,7 @@ def judged(kind: str, seed: int) -> dict:
             path = pathlib.Path(folder) / "robot.xml"
             path.write_text(case.robot_source, encoding="utf-8")
             robot = load_robot(path)
-    d = diagnose(robot, list(case.recordings)).diagnosis
+    d = diagnose(robot, list(case.recordings)).diagnosis.to_json()
     truth = [(e["effect"], sorted(e["joints"])) for e in case.truth["effects"]]
     found = [(f["effect"], sorted(f["joints"])) for f in d["findings"]]
     stated = [

@@ -63,12 +63,12 @@ def judged(files: Files) -> dict:
     """The proof of one set, and what it says of the goals."""
     robot = load_robot(files[0])
     result = diagnose(robot, [read_recording(path, robot) for path in files[1]])
-    motion, findings = result.views["motion"], result.diagnosis["findings"]
-    told = {"verdict": result.diagnosis["verdict"],
-            "named": [f"{f['effect']} on {', '.join(f['joints'])}" for f in findings]}  # fmt: skip
+    motion, findings = result.views.motion, result.diagnosis.findings
+    told = {"verdict": result.diagnosis.verdict,
+            "named": [f"{f.effect} on {', '.join(f.joints)}" for f in findings]}  # fmt: skip
     if motion is None:
         return told | {"motion": None}
-    named = {joint for f in findings for joint in f["joints"]}
+    named = {joint for f in findings for joint in f.joints}
     rows = []
     for time in TIMES:
         k = motion["horizon"].index(time)

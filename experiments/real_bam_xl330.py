@@ -241,7 +241,7 @@ def diagnosed() -> dict:
     with tempfile.TemporaryDirectory() as folder:
         files = [write_servo(pathlib.Path(folder), name) for name, (kp, _) in servo_runs().items() if kp != JUDGED]
         robot = load_robot(files[0][0])
-        return diagnose(robot, [read_recording(path, robot) for _, path in files]).diagnosis
+        return diagnose(robot, [read_recording(path, robot) for _, path in files]).diagnosis.to_json()
 
 
 def run(config: Config) -> dict:

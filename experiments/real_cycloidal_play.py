@@ -47,7 +47,7 @@ def diagnosed(name: str) -> dict:
     with tempfile.TemporaryDirectory() as folder:
         model, path = write_cycloidal(pathlib.Path(folder), name)
         robot = load_robot(model)
-        diagnosis = diagnose(robot, [read_recording(path, robot)]).diagnosis
+        diagnosis = diagnose(robot, [read_recording(path, robot)]).diagnosis.to_json()
     play = [f["parameters"]["gap"] for f in diagnosis["findings"] if f["effect"] == "backlash"]
     gap = {key: round(play[0][key] / ARC_MINUTE, 2) for key in ("value", "std")} if play else None
     return {

@@ -47,9 +47,10 @@ def run(config: Config) -> dict:
                 unseen = [r for name, r in recordings.items() if name.endswith(test)]
                 seen = [r for name, r in recordings.items() if not name.endswith(test)]
                 result = diagnose(robot, seen)
+                diagnosis = result.diagnosis.to_json()
                 results[f"{design} {kind}"] = {
-                    "verdict": result.diagnosis["verdict"], "summary": result.diagnosis["summary"],
-                    "findings": result.diagnosis["findings"], "inertials": result.views["inertials"],
+                    "verdict": diagnosis["verdict"], "summary": diagnosis["summary"],
+                    "findings": diagnosis["findings"], "inertials": result.views.to_json()["inertials"],
                     "rmse_unseen": rmse(result.model, unseen), "goal": GOAL[design],
                 }  # fmt: skip
     return results

@@ -89,7 +89,7 @@ def main() -> None:
                         varied.append(read_recording(path, robot))
                     except RecordingError as error:  # half a run may hold nothing but rest
                         print(f"left out: {error}", flush=True)
-                found = diagnose(robot, varied).diagnosis["findings"]
+                found = diagnose(robot, varied).diagnosis.to_json()["findings"]
                 said = sorted(f"{f['effect']} on {', '.join(f['joints'])}" for f in found)
                 results.setdefault(machine, {})[name] = said
                 print(f"{machine}, {name}: {'; '.join(said) or 'nothing'}", flush=True)

@@ -53,7 +53,8 @@ class Config:
 
 def told(result: Result) -> dict[str, Any]:
     """What a diagnosis says, without its provenance."""
-    return {key: result.diagnosis[key] for key in ("verdict", "summary", "findings", "unexplained", "fit", "notes")}
+    diagnosis = result.diagnosis.to_json()
+    return {key: diagnosis[key] for key in ("verdict", "summary", "findings", "unexplained", "fit", "notes")}
 
 
 def go2() -> dict[str, Any]:

@@ -52,10 +52,11 @@ def run(config: Config) -> dict:
         name: np.sqrt(np.mean((smooth(whole.tau - tau))[unseen] ** 2, axis=0)).round(4).tolist()
         for name, tau in predict(result.model, whole).items()
     }
+    diagnosis = result.diagnosis.to_json()
     return {
-        "verdict": result.diagnosis["verdict"], "summary": result.diagnosis["summary"],
-        "findings": result.diagnosis["findings"], "rmse_unseen": rmse, "goal": GOAL,
-        "parameters": compared(result.diagnosis["findings"]),
+        "verdict": diagnosis["verdict"], "summary": diagnosis["summary"],
+        "findings": diagnosis["findings"], "rmse_unseen": rmse, "goal": GOAL,
+        "parameters": compared(diagnosis["findings"]),
     }  # fmt: skip
 
 

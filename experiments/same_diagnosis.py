@@ -55,7 +55,7 @@ def run(config: Config) -> dict:
                 place.mkdir()
                 (place / "map.toml").write_text(lines or "")
                 recordings.append(read_recording(write(motion, place), robot, place / "map.toml" if lines else None))
-        found = diagnose(robot, recordings).diagnosis
+        found = diagnose(robot, recordings).diagnosis.to_json()
         first = found if first is None else first
         rows[kind] = compared(found, first) | {"seconds": round(time.perf_counter() - start, 1)}
         print(kind, rows[kind], flush=True)

@@ -149,7 +149,7 @@ def judged(kind: Kind, seed: int) -> dict:
     start = time.monotonic()
     result = diagnose(robot, recordings)
     seconds = time.monotonic() - start
-    d = result.diagnosis
+    d = result.diagnosis.to_json()
     record = {
         "seed": seed, "row": row, "joints_of_robot": robot.n, "truth": case.truth["effects"], "found": d["findings"],
         "verdict": d["verdict"], "unexplained": d["unexplained"], "fit": d["fit"], "oracle": None,
@@ -159,8 +159,9 @@ def judged(kind: Kind, seed: int) -> dict:
     # Beside them their special cases: an oracle without them would call dry friction asymmetric whatever the data say.
     told |= {special for slug in told for special in CATALOGUE[slug].law.contains}
     if told and (kind == "single" or trials_report.missed(record)):
-        oracle = diagnose(robot, recordings, DiagnoseConfig(effects=tuple(CATALOGUE[s] for s in told))).diagnosis
-        record["oracle"] = {"fit": oracle["fit"], "found": oracle["findings"]}
+        oracle = diagnose(robot, recordings, DiagnoseConfig(effects=tuple(CATALOGUE[s] for s in told)))
+        said = oracle.diagnosis.to_json()
+        record["oracle"] = {"fit": said["fit"], "found": said["findings"]}
     return record
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from irb140_jax import mismatch, recordings, report
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch import CorrectedRobot, DiagnoseConfig, Result
+from irb140_jax.mismatch import CorrectedRobot, DiagnoseConfig, Finding, Result
+from irb140_jax.mismatch.result import Verdict
 from irb140_jax.recordings import Recording
 from irb140_jax.recordings import drive as drives
 from irb140_jax.report import text
@@ -25,7 +26,7 @@ class Diagnosis:
     """What a diagnosis says, with the corrected model.
 
     Attributes:
-        result: Everything: the document, the model, data of the report's drawings, what is open.
+        result: Everything: the diagnosis, the model, data of the report's drawings, what is open.
     """
 
     result: Result
@@ -33,22 +34,22 @@ class Diagnosis:
     @property
     def document(self) -> dict[str, Any]:
         """What diagnosis.json holds."""
-        return self.result.diagnosis
+        return self.result.diagnosis.to_json()
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         """One of no_mismatch, parameters_only, physics_left_out, unexplained, undecided."""
-        return self.document["verdict"]
+        return self.result.diagnosis.verdict
 
     @property
-    def findings(self) -> list[dict[str, Any]]:
+    def findings(self) -> tuple[Finding, ...]:
         """Named effects with joints, parameters, evidence and rivals, strongest first."""
-        return self.document["findings"]
+        return self.result.diagnosis.findings
 
     @property
     def summary(self) -> str:
         """A short paragraph."""
-        return self.document["summary"]
+        return self.result.diagnosis.summary
 
     @property
     def corrected(self) -> CorrectedRobot:
@@ -61,7 +62,7 @@ class Diagnosis:
 
     def html(self, folder: Path = "DIR") -> str:
         """The report, one page; `folder` stands in the commands that it proposes."""
-        return report.html_report(self.document, self.result.views, folder=os.fspath(folder))
+        return report.html_report(self.result.diagnosis, self.result.views, folder=os.fspath(folder))
 
     def save(self, folder: Path) -> pathlib.Path:
         """Write what `irb140 diagnose` writes; whole or not at all, over a former diagnosis only.
@@ -84,11 +85,11 @@ class Diagnosis:
     def _repr_html_(self) -> str:
         rows = []
         for finding in self.findings:
-            shown = [f"{text.words(name)} {text.with_std(p['value'], p['std'])} {p['unit']}"
-                     for name, p in finding["parameters"].items()]  # fmt: skip
-            joints, probability = ", ".join(finding["joints"]), text.percent(finding["evidence"]["probability"])
-            rows.append((text.words(finding["effect"]), joints, "; ".join(shown), probability))
-        said = f"{text.VERDICTS.get(self.verdict, self.verdict)}. {self.summary}"
+            shown = [f"{text.words(name)} {text.with_std(p.value, p.std)} {p.unit}"
+                     for name, p in finding.parameters.items()]  # fmt: skip
+            joints, probability = ", ".join(finding.joints), text.percent(finding.evidence.probability)
+            rows.append((text.words(finding.effect), joints, "; ".join(shown), probability))
+        said = f"{text.VERDICTS[self.verdict]}. {self.summary}"
         return table_html(("effect", "joints", "parameters", "probability"), rows, said)
 
 

@@ -82,8 +82,8 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
             robot, recordings, unseen = _read(case, pathlib.Path(folder))
         result = (diagnose or mismatch.diagnose)(robot, recordings)
         out["seconds"] = time.perf_counter() - began
-        out["diagnosis"] = {k: result.diagnosis[k] for k in KEPT if k in result.diagnosis}
-        out["sentences"] = [x["sentence"] for x in result.views.get("inertials", []) if x["sentence"]]
+        out["diagnosis"] = {k: v for k, v in result.diagnosis.to_json().items() if k in KEPT}
+        out["sentences"] = [x["sentence"] for x in result.views.to_json()["inertials"] if x["sentence"]]
         out |= _compared(case, result, [mismatch.predict(result.model, r) for r in unseen])
     except InputError as error:
         out["refused"] = re.sub(r"\S*/(?=\w+\.\w+)", "", str(error))  # file names, without this machine's folders

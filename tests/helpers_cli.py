@@ -65,7 +65,7 @@ def stub(monkeypatch):
         return result
 
     def save(result, out_dir):
-        (out_dir / "diagnosis.json").write_text(json.dumps(result.diagnosis))
+        (out_dir / "diagnosis.json").write_text(json.dumps(result.diagnosis.to_json()))
         (out_dir / "model.json").write_text("{}")
 
     def predict(model, recording):

@@ -1,6 +1,6 @@
 """Work that takes no time, for tests of the processes around it, and an example of diagnoses to compare."""
 
-import copy
+import dataclasses
 import json
 import os
 import pathlib
@@ -10,6 +10,7 @@ import time
 import helpers_report
 
 from irb140_jax.errors import InputError
+from irb140_jax.mismatch.result import DiagnosedRecording, Diagnosis, Estimate
 from irb140_jax.report.made import write_manifest
 
 
@@ -22,7 +23,7 @@ def made_at_once(task) -> None:
         raise RuntimeError("a bug")
     if said[0] == "die":
         os.kill(os.getpid(), signal.SIGKILL)
-    diagnosis = helpers_report.example_diagnosis()
+    diagnosis = helpers_report.example_document()
     diagnosis["findings"][0]["parameters"]["coulomb"]["value"] = float(said[1])
     diagnosis["provenance"]["recordings"] = [
         {"file": path.name, "sha256": path.name, "rows": 10, "rate": 100.0, "duration": 1.0}
@@ -49,13 +50,10 @@ def units_folder(folder: pathlib.Path, words: list[str]) -> pathlib.Path:
     return folder
 
 
-def diagnosis_with(value: float, std: float, recording: str) -> dict:
+def diagnosis_with(value: float, std: float, recording: str) -> Diagnosis:
     """A diagnosis of one effect with one parameter."""
-    out = copy.deepcopy(helpers_report.example_diagnosis())
-    out["findings"] = [out["findings"][1]]
-    out["findings"][0]["parameters"] = {"viscous": {"value": value, "std": std, "unit": "N m s/rad"}}
-    out["unexplained"], out["not_testable"] = [], []
-    out["provenance"]["recordings"] = [
-        {"file": recording, "sha256": recording, "rows": 10, "rate": 100.0, "duration": 1.0}
-    ]
-    return out
+    whole = helpers_report.example_diagnosis()
+    coupling = dataclasses.replace(whole.findings[1], parameters={"viscous": Estimate(value, std, "N m s/rad")})
+    of = (DiagnosedRecording(recording, recording, 10, 100.0, 1.0),)
+    origin = dataclasses.replace(whole.provenance, recordings=of)
+    return dataclasses.replace(whole, findings=(coupling,), unexplained=(), not_testable=(), provenance=origin)

@@ -88,7 +88,7 @@ def findings(xml: str, hide: Callable[[mujoco.MjModel], None], seed: int, **duri
     """What a diagnosis of two recordings finds."""
     rng = np.random.default_rng(seed)
     robot = robot_from_model(mujoco.MjModel.from_xml_string(xml), source="native")
-    return diagnose(robot, [recorded(xml, hide, rng, **during) for _ in range(2)]).diagnosis["findings"]
+    return diagnose(robot, [recorded(xml, hide, rng, **during) for _ in range(2)]).diagnosis.to_json()["findings"]
 
 
 def found(xml: str, hide: Callable[[mujoco.MjModel], None], seed: int, **during) -> dict[tuple[str, ...], tuple]:

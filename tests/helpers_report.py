@@ -2,10 +2,19 @@
 
 import numpy as np
 
+from irb140_jax.mismatch.output.inertials import LinkShift
+from irb140_jax.mismatch.output.views import Maps, Ranked, Traces, Views
+from irb140_jax.mismatch.result import Diagnosis
+
 JOINTS = tuple(f"joint{i}" for i in range(1, 7))
 
 
-def example_diagnosis() -> dict:
+def example_diagnosis() -> Diagnosis:
+    """What `example_document` says."""
+    return Diagnosis.from_json(example_document())
+
+
+def example_document() -> dict:
     """A diagnosis.json with two findings, an alternative, something unexplained and something not testable."""
     fit = {}
     for i, name in enumerate(JOINTS):
@@ -87,14 +96,14 @@ def example_diagnosis() -> dict:
     }
 
 
-def example_views() -> dict:
-    """The matching views: maps, motions, ranking, spectra, inertials, notes."""
+def example_views() -> Views:
+    """The matching views: maps, motions, ranking, spectra, inertials and notes."""
     rng = np.random.default_rng(7)
     q_edges, qd_edges = np.linspace(-1.5, 1.5, 19), np.linspace(-2.0, 2.0, 17)
     q, qd = (0.5 * (e[1:] + e[:-1]) for e in (q_edges, qd_edges))
     t = np.arange(0.0, 12.0, 0.02)
     maps, spectra = {}, {}
-    motions = [{"recording": f"wave_{i}.csv", "t": t.tolist(), "joints": {}} for i in (3, 1)]
+    motions = tuple(Traces(f"wave_{i}.csv", t.tolist(), {}) for i in (3, 1))
     for i, name in enumerate(JOINTS):
         size = 8.0 / (1 + i)
         nominal = size * np.tanh(qd / 0.2)[None, :] + 0.3 * size * np.sin(2 * q)[:, None]
@@ -104,19 +113,13 @@ def example_views() -> dict:
             [None if h else float(v) for v, h in zip(row, hide, strict=True)]
             for row, hide in zip(grid, hidden, strict=True)
         ]
-        maps[name] = {
-            "q_edges": q_edges.tolist(),
-            "qd_edges": qd_edges.tolist(),
-            "nominal": blank(nominal),
-            "corrected": blank(corrected),
-            "unit": "N m",
-        }
+        maps[name] = Maps(q_edges.tolist(), qd_edges.tolist(), blank(nominal), blank(corrected), "N m")
         phase = 0.7 * t + 0.4 * i
         rigid = 4 * size * np.sin(phase) + size * np.sin(2.3 * phase)
         friction = size * np.tanh(6 * np.cos(phase))
         noise = 0.08 * size * rng.standard_normal(t.size)
         swing = 1.4 * np.sin(phase)
-        motions[0]["joints"][name] = {
+        motions[0].joints[name] = {
             "q": swing.tolist(),
             "qd": (1.4 * 0.7 * np.cos(phase)).tolist(),
             "measured": (rigid + friction + noise).tolist(),
@@ -125,9 +128,9 @@ def example_views() -> dict:
             "corrected": (rigid + 0.97 * friction).tolist(),
         }
         # The second one is half as fast, and a value of it is missing.
-        motions[1]["joints"][name] = {
-            key: [None if i == 3 else (0.5 if key == "qd" else 1.0) * v for i, v in enumerate(values)]
-            for key, values in motions[0]["joints"][name].items()
+        motions[1].joints[name] = {
+            key: [None if i == 3 else (0.5 if key == "qd" else 1.0) * (v or 0.0) for i, v in enumerate(values)]
+            for key, values in motions[0].joints[name].items()
         }
         f = np.geomspace(0.1, 50.0, 60)
         spectra[name] = {
@@ -136,44 +139,21 @@ def example_views() -> dict:
             "refit": (0.6 * size / (1 + f)).tolist(),
             "corrected": (0.05 * size * np.ones_like(f)).tolist(),
         }
-    return {
-        "joints": list(JOINTS),
-        "recordings": ["wave_1.csv", "wave_2.csv", "wave_3.csv"],
-        "maps": maps,
-        "motions": motions,
-        "ranking": [
-            _ranked("stribeck_friction", ["joint2"], 1843.7, 0.97, True, "alone"),
-            _ranked("coulomb_friction", ["joint2"], 1790.1, 0.0, False, "alone"),
-            _ranked("load_dependent_friction", ["joint2"], 1836.0, 0.03, False, "alone"),
-            _ranked("transmission_coupling", ["joint5", "joint6"], 412.2, 0.999, True, "alone"),
-            _ranked("viscous_friction", ["joint5"], 260.4, 0.0, False, "alone"),
-            _ranked("torque_offset", ["joint3"], -6.1, 0.0, False, "given the others"),
-            _ranked("viscous_friction", ["joint5"], 3.2, 0.01, False, "given the others"),
-        ],
-        "residual_spectrum": spectra,
-        "inertials": [
-            {
-                "link": "link2",
-                "shift_sigma": 2.6,
-                "mass_nominal": 16.06,
-                "mass_refit": 17.31,
-                "sentence": "link2 is 7.8 % heavier than the model says.",
-            }
-        ],
-        "notes": [
-            "wave_2.csv: 14 samples were missing and the gaps were left out.",
-            "Velocities and accelerations come from the positions, smoothed below 12 Hz.",
-        ],
-    }
-
-
-def _ranked(effect: str, joints: list[str], delta_bic: float, probability: float, chosen: bool, stage: str) -> dict:
-    """One row of the ranking."""
-    return {
-        "effect": effect,
-        "joints": joints,
-        "delta_bic": delta_bic,
-        "probability": probability,
-        "chosen": chosen,
-        "stage": stage,
-    }
+    return Views(
+        joints=JOINTS,
+        recordings=("wave_1.csv", "wave_2.csv", "wave_3.csv"),
+        maps=maps,
+        motions=motions,
+        ranking=(
+            Ranked("stribeck_friction", ("joint2",), 1843.7, 0.97, True, "alone"),
+            Ranked("coulomb_friction", ("joint2",), 1790.1, 0.0, False, "alone"),
+            Ranked("load_dependent_friction", ("joint2",), 1836.0, 0.03, False, "alone"),
+            Ranked("transmission_coupling", ("joint5", "joint6"), 412.2, 0.999, True, "alone"),
+            Ranked("viscous_friction", ("joint5",), 260.4, 0.0, False, "alone"),
+            Ranked("torque_offset", ("joint3",), -6.1, 0.0, False, "given the others"),
+            Ranked("viscous_friction", ("joint5",), 3.2, 0.01, False, "given the others"),
+        ),
+        residual_spectrum=spectra,
+        inertials=(LinkShift("link2", 2.6, 16.06, 17.31, "link2 is 7.8 % heavier than the model says."),),
+        notes=example_diagnosis().notes,
+    )

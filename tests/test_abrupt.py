@@ -42,5 +42,5 @@ def test_steps_of_the_torque_between_samples_are_no_left_out_physics(seed):
         tau += 0.01 * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)
         q += 1e-5 * rng.normal(size=q.shape)
         recordings.append(Recording(t, q, tau, ("x", "y", "z"), source=f"trapezoids {k}"))
-    diagnosis = diagnose(robot, recordings).diagnosis
+    diagnosis = diagnose(robot, recordings).diagnosis.to_json()
     assert diagnosis["findings"] == [] and diagnosis["unexplained"] == []

@@ -94,7 +94,7 @@ def hidden() -> tuple[Robot, Recording, Result]:
 
 
 def test_a_diagnosis_names_an_effect_given_as_an_object_where_mujoco_hid_it():
-    result = hidden()[-1].diagnosis
+    result = hidden()[-1].diagnosis.to_json()
     assert [(f["effect"], f["joints"]) for f in result["findings"]] == [("quadratic_drag", ["joint1"])]
     found = result["findings"][0]["parameters"]["drag"]
     assert found["value"] == pytest.approx(0.6, abs=max(0.06, 4.0 * found["std"]))

@@ -299,7 +299,7 @@ def test_the_share_done_and_the_time_left_are_told_as_far_as_they_are_known():
 
 
 def test_the_steps_of_which_the_share_is_known_are_those_that_a_diagnosis_tells():
-    told = " ".join(path.read_text() for path in (MODEL.parents[1] / "irb140_jax" / "mismatch").glob("*.py"))
+    told = " ".join(path.read_text() for path in (MODEL.parents[1] / "irb140_jax" / "mismatch").rglob("*.py"))
     for words in STEPS:
         assert re.sub(r" \(round \d\)", " (round {turn})", words) in told, words
 

@@ -1,5 +1,6 @@
 """irb140 compare: heterogeneity tests against other ways to the same numbers, sentences, and what is refused."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -12,6 +13,7 @@ from irb140_jax import cli
 from irb140_jax.errors import InputError
 from irb140_jax.fleet.compare import Given, compare
 from irb140_jax.fleet.heterogeneity import cochran, differences, holm, pooled
+from irb140_jax.mismatch.result import NotTestable
 from irb140_jax.report.compared import comparison_html, headline
 
 
@@ -83,13 +85,12 @@ def test_the_odd_one_is_named():
 
 def test_an_effect_that_one_could_not_have_shown_is_no_difference():
     a, b = given((10.0, 0.1), (10.0, 0.1))
-    effect, joints = b.diagnosis["findings"][0]["effect"], b.diagnosis["findings"][0]["joints"]
-    b.diagnosis["findings"].clear()
-    b.diagnosis["not_testable"].append({"effect": effect, "joints": joints, "needs": "more"})
-    (found,) = compare([a, b])["effects"]
+    (coupling,) = b.diagnosis.findings
+    silent = dataclasses.replace(b.diagnosis, findings=())
+    blind = dataclasses.replace(silent, not_testable=(NotTestable(coupling.effect, coupling.joints, "more"),))
+    (found,) = compare([a, Given("b", blind)])["effects"]
     assert found["says"] == "named_in_some" and "could not have shown it" in found["sentence"]
-    b.diagnosis["not_testable"].clear()
-    assert "could have shown it and does not name it" in compare([a, b])["effects"][0]["sentence"]
+    assert "could have shown it and does not name it" in compare([a, Given("b", silent)])["effects"][0]["sentence"]
 
 
 def test_what_cannot_be_compared_is_refused():
@@ -98,9 +99,10 @@ def test_what_cannot_be_compared_is_refused():
         compare([a])
     with pytest.raises(InputError, match="r0.csv is in a"):
         compare([a, Given("again", a.diagnosis)])
-    b.diagnosis["provenance"]["robot"]["joints"] = ["elbow"]
+    other = dataclasses.replace(b.diagnosis.provenance.robot, joints=("elbow",))
+    origin = dataclasses.replace(b.diagnosis.provenance, robot=other)
     with pytest.raises(InputError, match="elbow"):
-        compare([a, b])
+        compare([a, Given("b", dataclasses.replace(b.diagnosis, provenance=origin))])
 
 
 def test_the_page_has_a_plot_for_each_parameter_and_takes_no_markup_from_names():
@@ -113,7 +115,7 @@ def test_the_page_has_a_plot_for_each_parameter_and_takes_no_markup_from_names()
 def test_the_command_writes_what_it_says(tmp_path, capsys):
     for one in given((10.0, 0.1), (12.0, 0.1)):
         (tmp_path / one.name).mkdir()
-        (tmp_path / one.name / "diagnosis.json").write_text(json.dumps(one.diagnosis))
+        (tmp_path / one.name / "diagnosis.json").write_text(json.dumps(one.diagnosis.to_json()))
     for _ in range(2):  # the second replaces the first
         assert cli.main(["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(tmp_path / "c")]) == 0
     assert "Differs: from a to b by +2.00" in " ".join(capsys.readouterr().out.split())

@@ -33,14 +33,14 @@ def named(diagnosis: dict) -> dict:
 
 @pytest.fixture(scope="module")
 def sound() -> dict:
-    return named(diagnose(made.robot(), recordings()).diagnosis)
+    return named(diagnose(made.robot(), recordings()).diagnosis.to_json())
 
 
 def test_findings_of_healthy_joints_are_those_of_living_channels(sound):
     def dead(tau):
         tau[:, 1] = 0.0
 
-    diagnosis = diagnose(made.robot(), recordings(dead)).diagnosis
+    diagnosis = diagnose(made.robot(), recordings(dead)).diagnosis.to_json()
     healthy = {key: value for key, value in sound.items() if "elbow" not in key}
     assert {key[0] for key in healthy} == {"coulomb_friction", "viscous_friction"} and len(healthy) == 4
     found = named(diagnosis)
@@ -58,7 +58,7 @@ def test_a_channel_that_freezes_halfway_still_names_what_it_held_before(sound):
     def frozen(tau):
         tau[len(tau) // 2 :, 0] = tau[len(tau) // 2, 0]
 
-    diagnosis = diagnose(made.robot(), recordings(frozen)).diagnosis
+    diagnosis = diagnose(made.robot(), recordings(frozen)).diagnosis.to_json()
     # Of the shoulder half the rows are left, which are too few to tell viscous friction from other laws.
     assert sound.keys() - named(diagnosis).keys() <= {("viscous_friction", "shoulder")}
     assert named(diagnosis).keys() <= sound.keys()

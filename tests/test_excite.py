@@ -117,11 +117,11 @@ def test_a_robot_without_limits_gets_those_of_what_was_seen():
 
 def test_what_another_joints_motion_cannot_show_is_not_testable():
     _, result = slow_case()
-    blind = {n["effect"]: n for n in result.diagnosis["not_testable"]}
-    assert not any("joint2" in f["joints"] for f in result.diagnosis["findings"])
+    blind = {n.effect: n for n in result.diagnosis.not_testable}
+    assert not any("joint2" in f.joints for f in result.diagnosis.findings)
     for effect in ("load_dependent_friction", "coulomb_friction", "stribeck_friction", "viscous_friction"):
-        assert "joint2" in blind[effect]["joints"] and "joint1" not in blind[effect]["joints"]
-        assert blind[effect]["needs"].startswith("Needs ")
+        assert "joint2" in blind[effect].joints and "joint1" not in blind[effect].joints
+        assert blind[effect].needs.startswith("Needs ")
     assert "external_wrench" not in blind  # a push leaves its trace whenever it comes
 
 
@@ -135,7 +135,7 @@ def test_the_proposed_motion_makes_the_hidden_effect_visible():
 def test_recording_the_proposed_motion_names_what_was_hidden():
     case, _ = slow_case()
     again = diagnose(arm()[1], [*case.recordings, *record_again(case, [proposal().motion], seed=6)]).diagnosis
-    assert ("load_dependent_friction", ["joint2"]) in [(f["effect"], f["joints"]) for f in again["findings"]]
+    assert ("load_dependent_friction", ("joint2",)) in [(f.effect, f.joints) for f in again.findings]
 
 
 def test_the_proposed_motion_stays_within_the_limits_from_rest_to_rest():

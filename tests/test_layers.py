@@ -28,8 +28,8 @@ LAYERS = (
 )
 # Inside mismatch/: the stages of a diagnosis, in their order.
 STAGES = (
-    "inertials", "columns", "regression", "selection", "corrected", "validation", "experiment_design", "motion",
-    "result", "output", "diagnose",
+    "records", "result", "inertials", "columns", "regression", "selection", "corrected", "validation",
+    "experiment_design", "motion", "output", "diagnose",
 )  # fmt: skip
 LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}
 

@@ -42,7 +42,7 @@ def diagnosis(model, recording, tmp_path_factory) -> irb.Diagnosis:
 
 
 def test_what_is_hidden_is_found_from_a_path(diagnosis):
-    assert diagnosis.findings[0]["joints"] == ["elbow"]
+    assert diagnosis.findings[0].joints == ("elbow",)
     assert diagnosis.document["provenance"]["recordings"][0]["file"] == "run.csv"
 
 

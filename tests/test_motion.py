@@ -177,7 +177,7 @@ def test_where_every_model_is_lost_the_text_says_from_when():
 
 def test_the_report_shows_the_proof_and_the_folder_holds_it_apart_from_the_diagnosis(tmp_path, monkeypatch):
     motion = proof(named("viscous_friction", 0, VISCOUS))
-    views = example_views() | {"motion": motion}
+    views = dataclasses.replace(example_views(), motion=motion)
     page = html_report(example_diagnosis(), views)
     assert "Proof in motion" in page and motion["sentences"][0] in page
     assert "Proof in motion" not in html_report(example_diagnosis(), example_views())

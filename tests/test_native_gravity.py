@@ -49,6 +49,6 @@ def test_a_tilt_that_one_joint_shows_a_part_of_is_not_known_by_its_size():
         true.dof_frictionloss[0] = 0.3
 
     rng, robot = np.random.default_rng(0), robot_from_model(mujoco.MjModel.from_xml_string(TWO_LINKS), source="native")
-    found = diagnose(robot, [recorded(TWO_LINKS, hide, rng) for _ in range(2)]).diagnosis["findings"]
+    found = diagnose(robot, [recorded(TWO_LINKS, hide, rng) for _ in range(2)]).diagnosis.to_json()["findings"]
     tilt = next(f["parameters"]["tilt"] for f in found if f["effect"] == "gravity_tilt")
     assert abs(tilt["value"] - 0.13) < 1.645 * tilt["std"] < 0.3

@@ -17,7 +17,8 @@ BENDING = HEAD + f"""<body pos="0 0 1"><joint name="swing" axis="0 1 0" range="-
 def test_a_spring_that_takes_less_than_half_a_hundredth_of_the_torque_is_named():
     rng = np.random.default_rng(0)
     robot = robot_from_model(mujoco.MjModel.from_xml_string(PENDULUM), source="native")
-    d = diagnose(robot, [recorded(PENDULUM, lambda true: None, rng, truly=BENDING) for _ in range(2)]).diagnosis
+    recordings = [recorded(PENDULUM, lambda true: None, rng, truly=BENDING) for _ in range(2)]
+    d = diagnose(robot, recordings).diagnosis.to_json()
     assert [f["effect"] for f in d["findings"]] == ["joint_elasticity"]
     spring = d["findings"][0]["parameters"]["stiffness"]
     assert abs(spring["value"] / STIFFNESS - 1.0) < 0.2

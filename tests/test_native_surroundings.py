@@ -16,7 +16,8 @@ def test_a_push_that_is_at_once_there_and_gone_in_one_of_three_recordings_is_all
     rng = np.random.default_rng(0)
     robot = robot_from_model(mujoco.MjModel.from_xml_string(CYLINDRICAL), source="native")
     during = [{}, {"pushed": pushed}, {}]
-    found = diagnose(robot, [recorded(CYLINDRICAL, lambda true: None, rng, **d) for d in during]).diagnosis["findings"]
+    recordings = [recorded(CYLINDRICAL, lambda true: None, rng, **d) for d in during]
+    found = diagnose(robot, recordings).diagnosis.to_json()["findings"]
     assert [f["effect"] for f in found] == ["external_wrench"]
     push = {name: (p["value"], p["std"]) for name, p in found[0]["parameters"].items()}
     for name, true, off in (("t0", 5.03, 0.02), ("t1", 6.21, 0.02), ("force_x", 20.0, 2.0), ("force_y", 40.0, 4.0)):
@@ -34,5 +35,6 @@ def test_a_push_begins_or_ends_while_it_is_recorded(begins, named):
     rng = np.random.default_rng(0)
     robot = robot_from_model(mujoco.MjModel.from_xml_string(CYLINDRICAL), source="native")
     during = [{}, {"pushed": pushed}, {}]
-    found = diagnose(robot, [recorded(CYLINDRICAL, lambda true: None, rng, **d) for d in during]).diagnosis["findings"]
+    recordings = [recorded(CYLINDRICAL, lambda true: None, rng, **d) for d in during]
+    found = diagnose(robot, recordings).diagnosis.to_json()["findings"]
     assert ("external_wrench" in [f["effect"] for f in found]) == named

@@ -62,7 +62,7 @@ def test_a_payload_is_told_from_heavier_links(share):
     xml = plant(2, 4, slides=0.0)
     robot = robot_from_model(arm_spec(xml).compile(), "random")
     case = conceal(xml, [Concealment("payload", (), share)], three_motions(robot, 10.0, 500.0, seed=2), seed=3)
-    (finding,) = diagnose(robot, case.recordings).diagnosis["findings"]
+    (finding,) = diagnose(robot, case.recordings).diagnosis.to_json()["findings"]
     assert finding["effect"] == "payload"
     mass, true = finding["parameters"]["mass"], case.truth["effects"][0]["parameters"]["mass"]["value"]
     assert abs(mass["value"] - true) < min(3.0 * mass["std"], 0.25 * true)

@@ -14,13 +14,13 @@ OPTIONS = {"inertial_uncertainty": 0.05}
 
 def test_the_date_is_that_of_source_date_epoch(monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
-    assert provenance(made.robot(), [made.recording()], OPTIONS)["date"] == "1970-01-02"
+    assert provenance(made.robot(), [made.recording()], OPTIONS).date == "1970-01-02"
 
 
 @pytest.mark.parametrize("nonsense", ["tomorrow", "-1", "9" * 30])
 def test_a_date_that_no_calendar_has_is_today(monkeypatch, nonsense):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", nonsense)
-    assert provenance(made.robot(), [made.recording()], OPTIONS)["date"] > "2020"
+    assert provenance(made.robot(), [made.recording()], OPTIONS).date > "2020"
 
 
 def test_the_same_numbers_have_the_same_hash_under_any_name_and_other_numbers_another():
@@ -32,10 +32,10 @@ def test_the_same_numbers_have_the_same_hash_under_any_name_and_other_numbers_an
 def test_a_robot_with_another_mass_has_another_hash():
     robot = made.robot()
     heavier = eqx.tree_at(lambda r: r.mass, robot, robot.mass.at[0].multiply(1.001))
-    hashes = [provenance(r, [made.recording()], OPTIONS)["robot"]["sha256"] for r in (robot, made.robot(), heavier)]
+    hashes = [provenance(r, [made.recording()], OPTIONS).robot.sha256 for r in (robot, made.robot(), heavier)]
     assert hashes[0] == hashes[1] != hashes[2]
 
 
 def test_the_command_can_be_run_again():
     origin = provenance(made.robot(), [made.recording()], OPTIONS, ("--robot", "my arm.xml"))
-    assert origin["command"] == "irb140 diagnose made --robot 'my arm.xml' --inertial-uncertainty 0.05"
+    assert origin.command == "irb140 diagnose made --robot 'my arm.xml' --inertial-uncertainty 0.05"

@@ -78,7 +78,7 @@ def test_every_effect_of_the_catalogue_is_hidden_once():
 
 @every_effect
 def test_the_hidden_effect_is_named_on_its_joints_and_nothing_else_is(effect):
-    diagnosis = diagnosed(effect)[1].diagnosis
+    diagnosis = diagnosed(effect)[1].diagnosis.to_json()
     assert diagnosis["verdict"] == "physics_left_out"
     joints = HIDDEN_ON[effect] or ("joint1", "joint2", "joint3")
     assert [(f["effect"], tuple(f["joints"])) for f in diagnosis["findings"]] == [(effect, joints)]
@@ -88,7 +88,7 @@ def test_the_hidden_effect_is_named_on_its_joints_and_nothing_else_is(effect):
 @every_effect
 def test_parameters_of_the_hidden_effect_are_recovered(effect):
     case, result = diagnosed(effect)
-    found = result.diagnosis["findings"][0]["parameters"]
+    found = result.diagnosis.to_json()["findings"][0]["parameters"]
     for name, truth in case.truth["effects"][0]["parameters"].items():
         if name not in found or name in UNSEEN.get(effect, ()):
             continue  # signs, phases and directions are no parameters of the vocabulary
@@ -100,7 +100,7 @@ def test_parameters_of_the_hidden_effect_are_recovered(effect):
 
 @every_effect
 def test_the_correction_takes_off_half_of_what_refitting_leaves_on_unseen_data(effect):
-    fit = diagnosed(effect)[1].diagnosis["fit"]
+    fit = diagnosed(effect)[1].diagnosis.to_json()["fit"]
     beyond_noise = lambda j, kind: np.sqrt(max(fit[j][kind] ** 2 - fit[j]["noise_floor"] ** 2, 0.0))  # noqa: E731
     for joint in fit:
         # Where nothing is hidden, inertials that also have to suit the other joint may err by a little more.
@@ -113,7 +113,7 @@ def test_the_correction_takes_off_half_of_what_refitting_leaves_on_unseen_data(e
 
 def test_a_wall_is_found_where_it_stands_by_an_arm_that_feels_all_directions():
     robot, case = machine(2, 4, 0.0, Concealment("contact", (), SHARE))
-    (finding,) = diagnose(robot, case.recordings).diagnosis["findings"]
+    (finding,) = diagnose(robot, case.recordings).diagnosis.to_json()["findings"]
     assert finding["effect"] == "contact"
     wall = {name: p["value"] for name, p in case.truth["effects"][0]["parameters"].items()}
     found = {name: p["value"] for name, p in finding["parameters"].items()}
@@ -129,7 +129,7 @@ def test_a_torque_channel_out_of_step_is_named_and_corrected(late):
     behind = lambda r: np.interp(r.t - late, r.t, r.tau[:, 1])  # noqa: E731
     skewed = [dataclasses.replace(r, tau=np.stack([r.tau[:, 0], behind(r), r.tau[:, 2]], axis=1))
               for r in case.recordings]  # fmt: skip
-    diagnosis = diagnose(robot, skewed).diagnosis
+    diagnosis = diagnose(robot, skewed).diagnosis.to_json()
     (finding,) = diagnosis["findings"]
     assert finding["joints"] == [robot.joint_names[1]]
     if late < 0.0:  # torque logged early is what a lagging drive's log looks like at slow motion
@@ -165,7 +165,7 @@ def test_a_diagnosis_is_the_same_whenever_it_is_made():
 @pytest.mark.parametrize(("seed", "joints", "slides"), [(11, 1, 0.0), (12, 1, 1.0), (6, 3, 0.3), (4, 5, 0.4)])
 def test_nothing_is_named_where_nothing_is_hidden(seed, joints, slides):
     robot, case = machine(seed, joints, slides)
-    diagnosis = diagnose(robot, case.recordings).diagnosis
+    diagnosis = diagnose(robot, case.recordings).diagnosis.to_json()
     assert diagnosis["findings"] == [] and diagnosis["unexplained"] == []
     assert diagnosis["verdict"] in ("no_mismatch", "parameters_only")
     assert any(robot.is_slide) == (slides > 0.0)

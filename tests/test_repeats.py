@@ -36,11 +36,11 @@ def test_a_copy_under_another_name_is_left_out_and_said():
 
 def test_evidence_does_not_grow_by_repetition():
     robot = made.robot(pendulum=True)
-    once = diagnose(robot, [run(0, 0), run(1, 0)]).diagnosis
+    once = diagnose(robot, [run(0, 0), run(1, 0)]).diagnosis.to_json()
     files = [run(0, 0), run(1, 0), run(0, 0)]
-    thrice = diagnose(robot, [run(seed, noise) for seed in (0, 1) for noise in range(3)]).diagnosis
+    thrice = diagnose(robot, [run(seed, noise) for seed in (0, 1) for noise in range(3)]).diagnosis.to_json()
     assert "repeat one motion" in " ".join(thrice["notes"])
-    assert diagnose(robot, files).diagnosis["findings"] == once["findings"]
+    assert diagnose(robot, files).diagnosis.to_json()["findings"] == once["findings"]
     assert [f["effect"] for f in thrice["findings"]] == [f["effect"] for f in once["findings"]]
     for a, b in zip(thrice["findings"], once["findings"], strict=True):
         assert a["evidence"]["log_odds"] == pytest.approx(b["evidence"]["log_odds"], rel=0.3)

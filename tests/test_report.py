@@ -1,6 +1,6 @@
 """The report shows everything that the diagnosis holds, in one file that needs no network."""
 
-import copy
+import dataclasses
 import html.parser
 import io
 import json
@@ -14,6 +14,8 @@ import pytest
 from rich.console import Console
 
 from irb140_jax.cli.parsing import parsed
+from irb140_jax.mismatch.output.views import Views
+from irb140_jax.mismatch.result import Diagnosis, Estimate, Fit
 from irb140_jax.report import html_report, print_diagnosis, print_reveal, revealed, svg, svg_maps, text
 from irb140_jax.report.next_steps import next_steps
 from irb140_jax.report.overview import overview
@@ -47,12 +49,12 @@ class Page(html.parser.HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def diagnosis() -> dict:
+def diagnosis() -> Diagnosis:
     return helpers_report.example_diagnosis()
 
 
 @pytest.fixture(scope="module")
-def views() -> dict:
+def views() -> Views:
     return helpers_report.example_views()
 
 
@@ -69,37 +71,36 @@ def printed(diagnosis) -> str:
 
 
 def test_every_finding_is_in_the_report_with_its_parameters_units_and_alternatives(diagnosis, page):
-    for finding in diagnosis["findings"]:
-        assert text.words(finding["effect"]).capitalize() in page.visible
-        assert finding["where"] in page.visible
-        for name, p in finding["parameters"].items():
-            value, interval = text.with_std(p["value"], p["std"]), text.interval_90(p["value"], p["std"])
-            assert f"{text.words(name)} {value} {interval} {p['unit']}" in page.visible
-        for other in finding["alternatives"]:
-            assert other["separate_by"] in page.visible
+    for finding in diagnosis.findings:
+        assert text.words(finding.effect).capitalize() in page.visible
+        assert finding.where in page.visible
+        for name, p in finding.parameters.items():
+            value, interval = text.with_std(p.value, p.std), text.interval_90(p.value, p.std)
+            assert f"{text.words(name)} {value} {interval} {p.unit}" in page.visible
+        for other in finding.alternatives:
+            assert other.separate_by in page.visible
 
 
 def test_what_is_unexplained_or_not_testable_is_in_the_report(diagnosis, page):
-    for rest in diagnosis["unexplained"]:
-        assert rest["where"] in page.visible
-    for blind in diagnosis["not_testable"]:
-        assert blind["needs"] in page.visible
+    for rest in diagnosis.unexplained:
+        assert rest.where in page.visible
+    for blind in diagnosis.not_testable:
+        assert blind.needs in page.visible
 
 
 def test_every_joint_has_its_row_of_errors_its_maps_and_its_torque(diagnosis, views, page):
-    for joint, row in diagnosis["fit"].items():
-        numbers = " ".join(text.number(row[k]) for k in ("rmse_nominal", "rmse_refit", "rmse_corrected", "noise_floor"))
+    for joint, row in diagnosis.fit.items():
+        numbers = " ".join(map(text.number, dataclasses.astuple(row)))
         assert f"{joint} {numbers}" in page.visible
-        assert f"{joint}, {views['motions'][0]['recording']}" in page.visible  # the livelier one
+        assert f"{joint}, {views.motions[0].recording}" in page.visible  # the livelier one
     maps_and_loop = 3
-    assert page.visible.count("position [rad]") == maps_and_loop * len(views["joints"])
+    assert page.visible.count("position [rad]") == maps_and_loop * len(views.joints)
 
 
 def test_the_first_table_has_every_finding_at_its_joints_and_what_is_not_judged(diagnosis, views):
-    silent = dict.fromkeys(diagnosis["fit"]["joint4"])
-    judged = diagnosis | {"fit": diagnosis["fit"] | {"joint4": silent}}
-    units = dict.fromkeys(views["joints"], "N m")
-    rows = {row["name"]: row["cells"] for row in overview(judged, views["joints"], units)}
+    judged = dataclasses.replace(diagnosis, fit=diagnosis.fit | {"joint4": Fit()})
+    units = dict.fromkeys(views.joints, "N m")
+    rows = {row["name"]: row["cells"] for row in overview(judged, views.joints, units)}
     values = {name: [cell["value"] for cell in cells] for name, cells in rows.items()}
     assert values["stribeck friction"] == ["", "8.431 ± 0.071", "", "", "", ""]
     assert values["transmission coupling"][4:] == ["2.310 ± 0.040"] * 2
@@ -118,17 +119,17 @@ def test_what_to_do_next_comes_as_commands_that_the_command_line_understands(dia
 
 
 def test_an_undecided_diagnosis_proposes_a_recording_and_no_corrected_model(diagnosis, views):
-    nothing = {"verdict": "undecided", "findings": [], "unexplained": [], "not_testable": []}
-    steps = next_steps(diagnosis | nothing, "out")
+    nothing = dataclasses.replace(diagnosis, verdict="undecided", findings=(), unexplained=(), not_testable=())
+    steps = next_steps(nothing, "out")
     assert steps[0].code == ("irb140 excite out --out motion.csv",)
     assert not any("corrected" in step.say for step in steps)
 
 
 def test_the_report_says_where_it_comes_from(diagnosis, page):
-    provenance = diagnosis["provenance"]
-    assert provenance["command"] in page.visible and provenance["robot"]["sha256"] in page.visible
-    for recording in provenance["recordings"]:
-        assert f"{recording['file']} {recording['rows']} 250.0 30.00 {recording['sha256'][:16]}" in page.visible
+    provenance = diagnosis.provenance
+    assert provenance.command in page.visible and provenance.robot.sha256 in page.visible
+    for recording in provenance.recordings:
+        assert f"{recording.file} {recording.rows} 250.0 30.00 {recording.sha256[:16]}" in page.visible
 
 
 def test_no_sentence_stands_twice_in_the_report(page):
@@ -148,8 +149,8 @@ def test_every_drawing_and_every_table_has_a_name_for_those_who_do_not_see_it(di
 def test_the_data_of_the_viewer_are_those_of_the_views_to_five_digits(diagnosis, views):
     source = html_report(diagnosis, views)
     (block,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', source)
-    for shown, given in zip(json.loads(block)["motions"], views["motions"], strict=True):
-        for joint, columns in given["joints"].items():
+    for shown, given in zip(json.loads(block)["motions"], views.motions, strict=True):
+        for joint, columns in given.joints.items():
             for name, values in columns.items():
                 wanted = [np.nan if v is None else v for v in values]
                 got = [np.nan if v is None else v for v in shown["joints"][joint][name]]
@@ -157,7 +158,7 @@ def test_the_data_of_the_viewer_are_those_of_the_views_to_five_digits(diagnosis,
 
 
 def test_notes_and_inertials_are_in_the_report(views, page):
-    for sentence in [*views["notes"], *(link["sentence"] for link in views["inertials"])]:
+    for sentence in [*views.notes, *(link.sentence for link in views.inertials)]:
         assert sentence in page.visible
 
 
@@ -178,16 +179,15 @@ def test_no_drawing_holds_a_number_that_is_none(diagnosis, views):
 
 
 def test_names_from_files_cannot_inject_markup(diagnosis, views):
-    evil = copy.deepcopy(views)
-    evil["recordings"] = ["<b onload=x>.csv"]
-    source = html_report(diagnosis | {"notes": ["<script>alert(1)</script>"]}, evil)
+    evil = dataclasses.replace(views, recordings=("<b onload=x>.csv",))
+    source = html_report(dataclasses.replace(diagnosis, notes=("<script>alert(1)</script>",)), evil)
     assert "alert(1)</script" not in source and "<b onload" not in source
 
 
 def test_names_from_files_cannot_end_the_element_that_holds_the_data(diagnosis, views):
-    evil = copy.deepcopy(views)
-    evil["motions"][0]["recording"] = "</script><script>alert(1)</script>"
-    assert html_report(diagnosis, evil).count("</script>") == 2
+    first, *others = views.motions
+    evil = dataclasses.replace(first, recording="</script><script>alert(1)</script>")
+    assert html_report(diagnosis, dataclasses.replace(views, motions=(evil, *others))).count("</script>") == 2
 
 
 def test_the_report_is_made_within_its_time(diagnosis, views):
@@ -197,27 +197,26 @@ def test_the_report_is_made_within_its_time(diagnosis, views):
 
 
 def test_a_diagnosis_without_findings_or_views_has_a_report_too(diagnosis, views):
-    clean = diagnosis | {"verdict": "no_mismatch", "findings": [], "unexplained": [], "not_testable": []}
-    bare = {"joints": views["joints"], "recordings": ["a.csv"]}
-    page = Page(html_report(clean, bare))
+    clean = dataclasses.replace(diagnosis, verdict="no_mismatch", findings=(), unexplained=(), not_testable=())
+    page = Page(html_report(clean, Views(views.joints, ("a.csv",))))
     assert "No mismatch" in page.visible and "The model needs no change." in page.visible
     assert not page.wrong
 
 
 @pytest.mark.parametrize("verdict", ["no_mismatch", "parameters_only", "physics_left_out", "unexplained", "undecided"])
 def test_every_verdict_stands_before_the_summary_in_the_report_and_on_the_terminal(diagnosis, views, verdict):
-    judged = diagnosis | {"verdict": verdict}
-    title, start = text.VERDICTS[verdict], diagnosis["summary"][:40]
+    judged = dataclasses.replace(diagnosis, verdict=verdict)
+    title, start = text.VERDICTS[verdict], diagnosis.summary[:40]
     assert f"{title} {start}" in Page(html_report(judged, views)).visible
     assert f"{title}. {start}" in printed(judged)
 
 
 def test_the_terminal_names_every_finding_with_value_and_unit(diagnosis):
     shown = printed(diagnosis)
-    for finding in diagnosis["findings"]:
-        assert f"{text.words(finding['effect'])} {text.joint_list(finding['joints'])}" in shown
-        for name, p in finding["parameters"].items():
-            assert f"{text.words(name)} {text.with_std(p['value'], p['std'])} {p['unit']}" in shown
+    for finding in diagnosis.findings:
+        assert f"{text.words(finding.effect)} {text.joint_list(finding.joints)}" in shown
+        for name, p in finding.parameters.items():
+            assert f"{text.words(name)} {text.with_std(p.value, p.std)} {p.unit}" in shown
 
 
 def test_the_truth_is_sorted_into_found_missed_and_extra(diagnosis):
@@ -230,10 +229,10 @@ def test_the_truth_is_sorted_into_found_missed_and_extra(diagnosis):
         {"effect": "stribeck_friction", "joints": ["joint3"], "parameters": {}},
     ]
     reveal = revealed(hidden, diagnosis, "seal")
-    assert [effect["effect"] for effect in reveal.found] == ["transmission_coupling"]
-    assert reveal.found[0]["parameters"]["viscous"] == (2.3, 2.31, 0.04, "N m s/rad")
+    assert [effect.effect for effect in reveal.found] == ["transmission_coupling"]
+    assert reveal.found[0].parameters["viscous"] == (2.3, Estimate(2.31, 0.04, "N m s/rad"))
     assert [effect["joints"] for effect in reveal.missed] == [["joint3"]]
-    assert [effect["joints"] for effect in reveal.extra] == [["joint2"]]
+    assert [finding.joints for finding in reveal.extra] == [("joint2",)]
     assert not reveal.right
 
 

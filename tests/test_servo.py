@@ -41,7 +41,7 @@ def drive_of(recording):
 
 
 def names(result):
-    return {(f["effect"], *f["joints"]) for f in result.diagnosis["findings"]}
+    return {(f.effect, *f.joints) for f in result.diagnosis.findings}
 
 
 # --- the torque of a servo -------------------------------------------------------------------------------------------
@@ -145,7 +145,7 @@ def test_a_gain_of_zero_is_refused_with_its_line(robot, tmp_path):
 def test_a_servo_that_leaves_nothing_out_stays_silent_with_gains_ten_percent_wrong(robot):
     result = diagnosed(robot, stated_drive(1.1 * np.array(KP), 1.1 * np.array(KD)))
     assert names(result) == set()
-    assert "No torque was logged" in result.diagnosis["summary"]
+    assert "No torque was logged" in result.diagnosis.summary
 
 
 @pytest.fixture(scope="module")
@@ -155,8 +155,8 @@ def rubbing(robot):
 
 def test_friction_is_named_from_commands_alone_with_unknown_gains(rubbing):
     assert names(rubbing) == {("coulomb_friction", "elbow")}
-    found = rubbing.diagnosis["findings"][0]["parameters"]["coulomb"]
-    assert abs(found["value"] - 0.25) < 0.05 * 0.25 + 3.0 * found["std"]  # the scale is that of the inertials
+    found = rubbing.diagnosis.findings[0].parameters["coulomb"]
+    assert abs(found.value - 0.25) < 0.05 * 0.25 + 3.0 * found.std  # the scale is that of the inertials
 
 
 def test_the_report_says_that_no_torque_was_logged_and_in_which_unit_parameters_are_known(rubbing, tmp_path):
@@ -183,7 +183,7 @@ def test_predict_compares_with_the_torque_of_the_servo_that_was_diagnosed(rubbin
 def test_viscous_friction_of_a_servo_is_said_to_be_known_only_with_kd(robot):
     result = diagnosed(robot, STATED, shoulder='damping="0.4"')
     assert names(result) == {("viscous_friction", "shoulder")}
-    said = result.diagnosis["findings"][0]["certain"]
+    said = result.diagnosis.findings[0].certain
     known = float(said.split("the sum of both, ")[1].split(",")[0])
     assert "can't be told from the drive's Kd" in said
     assert abs(known - 2.4) < 0.05  # Kd 2 and 0.4: known better than either

@@ -69,7 +69,7 @@ def test_a_joint_that_hardly_moves_is_no_verdict(long):
                         np.full(len(long.t) - at[1], long.q[at[1], 0])])  # fmt: skip
     rng = np.random.default_rng(0)
     still = dataclasses.replace(long, q=(q + 1e-5 * rng.normal(size=q.shape))[:, None])
-    diagnosis = diagnose(made.robot(pendulum=True), [still]).diagnosis
+    diagnosis = diagnose(made.robot(pendulum=True), [still]).diagnosis.to_json()
     assert diagnosis["verdict"] == "undecided" and "No joint moves for long enough" in diagnosis["summary"]
 
 

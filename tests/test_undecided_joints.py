@@ -44,6 +44,6 @@ def test_what_is_as_large_as_the_torque_is_no_verdict():
         one = made.recording(seed=seed, pendulum=True, speeds=False, rate=200.0, duration=10.0)
         noise = np.random.default_rng(seed).normal(size=one.tau.shape)
         recordings.append(dataclasses.replace(one, tau=one.tau.std() * noise))
-    diagnosis = diagnose(robot, recordings).diagnosis
+    diagnosis = diagnose(robot, recordings).diagnosis.to_json()
     assert diagnosis["verdict"] == "undecided" and "may hide anything" in diagnosis["summary"]
     assert "record" in diagnosis["summary"]

@@ -30,7 +30,7 @@ def test_it_is_located_by_joint_and_variables_and_not_named(slug):
     robot = irb140()
     motions = three_motions(robot, 15.0, 500.0, seed=1)
     case = conceal(str(irb140_path()), [Concealment(slug, (joint,), SHARE)], motions, seed=2)
-    diagnosis = diagnose(robot, case.recordings).diagnosis
+    diagnosis = diagnose(robot, case.recordings).diagnosis.to_json()
     assert {(f["effect"], *f["joints"]) for f in diagnosis["findings"]} <= IN_PART.get(slug, set())
     assert diagnosis["verdict"] == ("physics_left_out" if diagnosis["findings"] else "unexplained")
     (rest,) = diagnosis["unexplained"]
@@ -44,7 +44,7 @@ def test_what_goes_with_time_counts_where_a_slow_sweep_makes_position_go_with_ti
     robot = robot_from_model(arm_spec(xml).compile(), source="random robot")
     motions = three_motions(robot, 15.0, 500.0, seed=113)
     case = conceal(xml, [Concealment("back_emf_sag", ("joint1",), SHARE)], motions, seed=2)
-    diagnosis = diagnose(robot, case.recordings).diagnosis
+    diagnosis = diagnose(robot, case.recordings).diagnosis.to_json()
     assert diagnosis["findings"] == []
     assert [u["joints"] for u in diagnosis["unexplained"]] == [["joint1"]]
 
@@ -55,7 +55,7 @@ def test_a_damper_between_joints_is_no_viscous_friction():
     motions = three_motions(robot, 15.0, 500.0, seed=1)
     diagnosis = diagnose(
         robot, conceal(xml, [Concealment("cross_damping", ("joint3",), SHARE)], motions, seed=2).recordings
-    ).diagnosis
+    ).diagnosis.to_json()
     # A tenth of it looks like dry friction.
     assert {f["effect"] for f in diagnosis["findings"]} <= {"coulomb_friction"}
     (rest,) = diagnosis["unexplained"]
@@ -67,7 +67,7 @@ def test_viscous_friction_stays_beside_friction_that_grows_with_load_where_more_
     motions = three_motions(robot, 15.0, 500.0, seed=1)
     hidden = {"load_dependent_friction": SHARE, "viscous_friction": 0.06, "cross_damping": SHARE}
     case = conceal(str(irb140_path()), [Concealment(e, joint, share) for e, share in hidden.items()], motions, seed=2)
-    diagnosis = diagnose(robot, case.recordings).diagnosis
+    diagnosis = diagnose(robot, case.recordings).diagnosis.to_json()
     found = {f["effect"] for f in diagnosis["findings"]}
     # Beside so much without a name, whether dry friction grows with load can't be told.
     assert "viscous_friction" in found and found <= {"load_dependent_friction", "coulomb_friction", "viscous_friction"}

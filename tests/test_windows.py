@@ -103,8 +103,8 @@ def test_a_diagnosis_does_not_depend_on_what_is_kept(monkeypatch):
     monkeypatch.setattr(columns, "KEPT", 0)
     monkeypatch.setattr(rows, "ROWS", 150)
     long = diagnose(ROBOT, [log]).diagnosis
-    names = [[(f["effect"], f["joints"]) for f in found["findings"]] for found in (whole, long)]
+    names = [[(f.effect, f.joints) for f in found.findings] for found in (whole, long)]
     assert names[0] == names[1]
-    for one, other in zip(whole["findings"], long["findings"], strict=True):
-        for name, value in one["parameters"].items():
-            assert other["parameters"][name]["value"] == pytest.approx(value["value"], rel=1e-3)
+    for one, other in zip(whole.findings, long.findings, strict=True):
+        for name, parameter in one.parameters.items():
+            assert other.parameters[name].value == pytest.approx(parameter.value, rel=1e-3)

@@ -6,7 +6,7 @@ from typing import Any
 import helpers_recordings as made
 import numpy as np
 
-from irb140_jax.mismatch.output.summary import _masses_known, _torque_change
+from irb140_jax.mismatch.output.inertials import _masses_known, _torque_change
 
 
 def explanation(seed: int = 0) -> Any:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import pathlib
-from json import dumps, loads
+from json import dumps
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import Positional, arg
@@ -78,9 +78,10 @@ irb140 compare may.csv june.csv --robot arm.xml --out c     recordings, each of 
         """A diagnosis as it is there, or made of recordings."""
         from irb140_jax.fleet.compare import Given
         from irb140_jax.fleet.layout import unit_of
+        from irb140_jax.mismatch import load_diagnosis
 
         if (path / "diagnosis.json").exists():
-            return Given(name, _read(path))
+            return Given(name, load_diagnosis(path))
         unit = unit_of(path, self.robot, self.columns)
         if unit.problem:
             raise InputError(f"{unit.problem}; or give the folder of a diagnosis")
@@ -101,26 +102,6 @@ def _write(comparison: dict[str, Any], made: dict[str, tuple[Diagnose, "Result"]
         command.write(result, own, own)
     (folder / FILES[0]).write_text(dumps(comparison, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     (folder / FILES[1]).write_text(comparison_html(comparison), encoding="utf-8")
-
-
-def _read(folder: pathlib.Path) -> dict[str, Any]:
-    """The diagnosis in a folder.
-
-    Raises:
-        InputError: It is none of this version.
-    """
-    from irb140_jax.mismatch.diagnose import SCHEMA
-    from irb140_jax.mismatch.output.intact import check_schema, refuse
-
-    path = folder / "diagnosis.json"
-    try:
-        diagnosis = loads(path.read_text(encoding="utf-8"))
-        check_schema(diagnosis, SCHEMA)
-        if missing := {"findings", "not_testable", "verdict", "provenance"} - diagnosis.keys():
-            raise ValueError(f"it lacks {', '.join(sorted(missing))}")
-        return diagnosis
-    except Exception as error:
-        refuse(path, error)
 
 
 def _names(paths: tuple[pathlib.Path, ...]) -> list[str]:

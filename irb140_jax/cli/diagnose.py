@@ -138,4 +138,4 @@ def show(result: "Result", out: pathlib.Path, *, json: bool = False) -> None:
     print_diagnosis(result.diagnosis, result.views, terminal)
     terminal.print(f"Report: {out / 'report.html'}", soft_wrap=True)
     if json:
-        print(dumps(result.diagnosis, indent=1, allow_nan=False))
+        print(dumps(result.diagnosis.to_json(), indent=1, allow_nan=False))

@@ -10,16 +10,17 @@ import numpy as np
 from irb140_jax.errors import InputError
 from irb140_jax.fleet.heterogeneity import LEVEL, Difference, all_within, cochran, differences, holm, pooled
 from irb140_jax.fleet.sentences import said_of_effect, said_of_parameter
+from irb140_jax.mismatch.result import Diagnosis, Estimate, Finding
 
 SCHEMA = 1  # of compare.json
 ORDER = ("differs", "named_in_some", "cannot_tell", "same")
 
 
 class Given(NamedTuple):
-    """A diagnosis to be compared: what it is called here, and what its diagnosis.json holds."""
+    """A diagnosis to be compared, and what it is called here."""
 
     name: str
-    diagnosis: Mapping[str, Any]
+    diagnosis: Diagnosis
 
 
 Site = tuple[str, tuple[str, ...]]  # an effect and its joints
@@ -39,7 +40,7 @@ def compare(given: Sequence[Given], same_within: float = 0.1) -> dict[str, Any]:
         InputError: They can't be compared: fewer than two, other joints, or the same recording in two of them.
     """
     _check(given)
-    sites = dict.fromkeys(_site(f) for one in given for f in one.diagnosis["findings"])
+    sites = dict.fromkeys(_site(f) for one in given for f in one.diagnosis.findings)
     every = [_parameters(given, site) for site in sites]
     tested = [p for parameters in every for p in parameters if p["p"] is not None]
     for p, adjusted in zip(tested, holm([p["p"] for p in tested]), strict=True):
@@ -65,45 +66,44 @@ def _check(given: Sequence[Given]) -> None:
     if len(given) < 2:
         raise InputError("compare: only one diagnosis was given; give two or more of one robot or of one kind of robot")
     first = given[0]
-    joints = first.diagnosis["provenance"]["robot"]["joints"]
+    joints = first.diagnosis.provenance.robot.joints
     for one in given[1:]:
-        others = one.diagnosis["provenance"]["robot"]["joints"]
+        others = one.diagnosis.provenance.robot.joints
         if others != joints:
             raise InputError(f"{one.name}: is of joints {', '.join(others)}, and {first.name} of {', '.join(joints)}; "
                              "compare diagnoses of the same joints")  # fmt: skip
     for one, other in itertools.combinations(given, 2):
-        mine, theirs = ({r["sha256"]: r["file"] for r in x.diagnosis["provenance"]["recordings"]} for x in (one, other))
+        mine, theirs = ({r.sha256: r.file for r in x.diagnosis.provenance.recordings} for x in (one, other))
         if twice := sorted(set(mine) & set(theirs)):
             raise InputError(f"{other.name}: its recording {theirs[twice[0]]} is in {one.name}, too, so they are not "
                              "independent; compare diagnoses of different recordings")  # fmt: skip
 
 
-def _site(finding: Mapping[str, Any]) -> Site:
-    return finding["effect"], tuple(finding["joints"])
+def _site(finding: Finding) -> Site:
+    return finding.effect, finding.joints
 
 
-def _finding(one: Given, site: Site) -> Mapping[str, Any] | None:
-    return next((f for f in one.diagnosis["findings"] if _site(f) == site), None)
+def _finding(one: Given, site: Site) -> Finding | None:
+    return next((f for f in one.diagnosis.findings if _site(f) == site), None)
 
 
 def _parameters(given: Sequence[Given], site: Site) -> list[dict[str, Any]]:
     """Every parameter of an effect with its values and, where there are two or more, tests and intervals."""
     found = [_finding(one, site) for one in given]
-    names = dict.fromkeys(name for f in found if f for name in f["parameters"])
-    return [_parameter(name, [f["parameters"].get(name) if f else None for f in found]) for name in names]
+    names = dict.fromkeys(name for f in found if f for name in f.parameters)
+    return [_parameter(name, [f.parameters.get(name) if f else None for f in found]) for name in names]
 
 
-def _parameter(name: str, values: Sequence[Mapping[str, Any] | None]) -> dict[str, Any]:
+def _parameter(name: str, values: Sequence[Estimate | None]) -> dict[str, Any]:
     out: dict[str, Any] = {
-        "parameter": name, "unit": next(v["unit"] for v in values if v),
-        "values": [v and {"value": v["value"], "std": v["std"]} for v in values],
+        "parameter": name, "unit": next(v.unit for v in values if v),
+        "values": [v and {"value": v.value, "std": v.std} for v in values],
         "pooled": None, "differences": [], "largest": None, "q": None, "p": None, "p_holm": None, "most_unlike": None,
     }  # fmt: skip
-    known = [k for k, v in enumerate(values) if v and v["std"] and v["value"] is not None]
-    if len(known) < 2:
+    whole = {k: (v.value, v.std) for k, v in enumerate(values) if v and v.std and v.value is not None}
+    if len(whole) < 2:
         return out
-    x = np.array([values[k]["value"] for k in known])  # pyright: ignore[reportOptionalSubscript]
-    s = np.array([values[k]["std"] for k in known])  # pyright: ignore[reportOptionalSubscript]
+    known, (x, s) = list(whole), np.array(list(whole.values())).T
     out["q"], out["p"] = cochran(x, s)
     out["pooled"] = pooled(x, s)._asdict()
     pairs = [d._replace(first=known[d.first], second=known[d.second]) for d in differences(x, s)]
@@ -143,31 +143,30 @@ def _effect(given: Sequence[Given], site: Site, parameters: list[dict[str, Any]]
 def _why_not(one: Given, site: Site) -> str:
     """Why a diagnosis doesn't name an effect that another one names, as far as it says."""
     slug, joints = site
-    for f in one.diagnosis["findings"]:
-        if set(f["joints"]) & set(joints) and slug in [a["effect"] for a in f["alternatives"]]:
-            return f"alternative:{f['effect']}"
-        if f["effect"] == slug and set(f["joints"]) & set(joints):
-            return f"other_joints:{','.join(f['joints'])}"
-    blind = [b for b in one.diagnosis["not_testable"] if b["effect"] == slug and set(b["joints"]) & set(joints)]
-    if blind:
+    for f in one.diagnosis.findings:
+        if set(f.joints) & set(joints) and slug in [a.effect for a in f.alternatives]:
+            return f"alternative:{f.effect}"
+        if f.effect == slug and set(f.joints) & set(joints):
+            return f"other_joints:{','.join(f.joints)}"
+    if any(b.effect == slug and set(b.joints) & set(joints) for b in one.diagnosis.not_testable):
         return "not_testable"
-    return "undecided" if one.diagnosis["verdict"] == "undecided" else "not_found"
+    return "undecided" if one.diagnosis.verdict == "undecided" else "not_found"
 
 
 def _origin(one: Given) -> dict[str, Any]:
-    origin = one.diagnosis["provenance"]
-    return {"name": one.name, "verdict": one.diagnosis["verdict"], "date": origin.get("date"),
-            "robot": origin["robot"]["name"], "recordings": [r["file"] for r in origin["recordings"]]}  # fmt: skip
+    origin = one.diagnosis.provenance
+    return {"name": one.name, "verdict": one.diagnosis.verdict, "date": origin.date,
+            "robot": origin.robot.name, "recordings": [r.file for r in origin.recordings]}  # fmt: skip
 
 
 def _notes(given: Sequence[Given]) -> list[str]:
     notes = []
-    if len({one.diagnosis["provenance"]["robot"].get("sha256") for one in given}) > 1:
+    if len({one.diagnosis.provenance.robot.sha256 for one in given}) > 1:
         notes.append("The diagnoses start from different models of the robot; each parameter counts from its own "
                      "model's value.")  # fmt: skip
-    if len({one.diagnosis["provenance"].get("version") for one in given}) > 1:
+    if len({one.diagnosis.provenance.version for one in given}) > 1:
         notes.append("The diagnoses were made by different versions of the program.")
-    if vague := [one.name for one in given if one.diagnosis["verdict"] in ("undecided", "unexplained")]:
+    if vague := [one.name for one in given if one.diagnosis.verdict in ("undecided", "unexplained")]:
         notes.append(f"{', '.join(vague)}: the verdict is undecided or unexplained, so an effect not named there may "
                      "still act.")  # fmt: skip
     return notes

@@ -1,6 +1,5 @@
 """All units of a part, side by side: each is diagnosed, stored, and reported."""
 
-import json
 import pathlib
 import shutil
 import time
@@ -11,7 +10,7 @@ from irb140_jax.fleet.layout import Unit
 from irb140_jax.fleet.row import row_of, row_without
 from irb140_jax.fleet.store import ResultsStore
 from irb140_jax.fleet.workers import Done, run_tasks
-from irb140_jax.report.made import DIAGNOSIS
+from irb140_jax.mismatch import load_diagnosis
 
 # Writes the diagnosis of a unit into an empty folder.
 Diagnosing = Callable[["Task"], None]
@@ -78,9 +77,9 @@ def _put(store: ResultsStore, one: Done) -> str:
         shutil.rmtree(fresh, ignore_errors=True)
         store.put(unit, key, row_without(unit, one.status, one.message))
         return one.status
-    diagnosis = json.loads((fresh / DIAGNOSIS).read_text(encoding="utf-8"))
+    diagnosis = load_diagnosis(fresh)
     store.put(unit, key, row_of(unit, diagnosis), fresh)
-    return diagnosis["verdict"]
+    return diagnosis.verdict
 
 
 def _size(task: Task) -> int:

@@ -10,8 +10,11 @@ from irb140_jax.mismatch.diagnose import diagnose as diagnose
 from irb140_jax.mismatch.experiment_design.design import Proposal as Proposal
 from irb140_jax.mismatch.experiment_design.design import propose as propose
 from irb140_jax.mismatch.experiment_design.undecided import Undecided as Undecided
+from irb140_jax.mismatch.output.store import Result as Result
 from irb140_jax.mismatch.output.store import load_corrected as load_corrected
+from irb140_jax.mismatch.output.store import load_diagnosis as load_diagnosis
 from irb140_jax.mismatch.output.store import load_model as load_model
 from irb140_jax.mismatch.output.store import load_undecided as load_undecided
 from irb140_jax.mismatch.output.store import save as save
-from irb140_jax.mismatch.result import Result as Result
+from irb140_jax.mismatch.result import Diagnosis as Diagnosis
+from irb140_jax.mismatch.result import Finding as Finding

@@ -174,3 +174,25 @@ def _clipping_note(tau: np.ndarray, name: str) -> list[str]:
             return [f"tau.{name} rests at its {word} value {end:.4g} in {flat.mean():.1%} of the samples: the drive "
                     "looks saturated there"]
     return []
+
+
+def checked_numbers(recording: Recording) -> Recording:
+    """The recording, if it is made of numbers, and of as many as a file must hold.
+
+    Raises:
+        RecordingError: It isn't.
+    """
+    if len(recording.t) < MIN_SAMPLES:
+        raise RecordingError(
+            f"{recording.source}: too short: {len(recording.t)} samples; allowed is {MIN_SAMPLES} samples at least: "
+            "record a longer motion"
+        )
+    for name in ("t", "q", "tau"):
+        bad = np.argwhere(~np.isfinite(getattr(recording, name)))
+        if len(bad):
+            column = name if name == "t" else f"{name}.{recording.joint_names[bad[0][1]]}"
+            raise RecordingError(
+                f"{recording.source}: {column}, sample {bad[0][0] + 1}: not a finite number; a diagnosis needs time, "
+                "positions and torque in every sample: read the file with read_recording, which mends a few gaps"
+            )
+    return recording

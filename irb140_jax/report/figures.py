@@ -1,49 +1,49 @@
 """The report's drawings: maps over position and speed, torque over time, position and speed, spectra."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from markupsafe import Markup
 
+from irb140_jax.mismatch.output.views import MODELS, Maps, Spectrum, Traces
 from irb140_jax.report import svg, svg_maps, text
 
-MODELS = ("nominal", "refit", "corrected")
 FULL_COLOUR = 0.98  # share of cells below the full colour, so that a single bad cell can't wash out a map
 MOST_POINTS = 500  # of a line on paper; the page's script draws all of them
 
 
-def map_pair(data: Mapping) -> dict:
+def map_pair(data: Maps) -> dict:
     """Two heat maps on one colour scale: what the model misses before and after."""
-    sizes = sorted(abs(v) for name in ("nominal", "corrected") for row in data[name] for v in row if v is not None)
+    sizes = sorted(abs(v) for grid in (data.nominal, data.corrected) for row in grid for v in row if v is not None)
     limit = (sizes[int(FULL_COLOUR * (len(sizes) - 1))] if sizes else 1.0) or 1.0
-    unit = text.motion_unit(data["unit"])
+    unit = text.motion_unit(data.unit)
 
-    def draw(title: str, name: str) -> Markup:
-        full = f"full colour at {text.number(limit)} {data['unit']}"
+    def draw(title: str, grid: svg_maps.Grid) -> Markup:
+        full = f"full colour at {text.number(limit)} {data.unit}"
         label = f"{title}: mean torque missed over position and speed, {full}"
-        return Markup(svg_maps.heat_map(title, data[name], data["q_edges"], data["qd_edges"], limit, unit, label))
+        return Markup(svg_maps.heat_map(title, grid, data.q_edges, data.qd_edges, limit, unit, label))
 
     return {
-        "nominal": draw("model as given", "nominal"),
-        "corrected": draw("corrected", "corrected"),
-        "bar": Markup(svg_maps.colour_bar(limit, data["unit"])),
+        "nominal": draw("model as given", data.nominal),
+        "corrected": draw("corrected", data.corrected),
+        "bar": Markup(svg_maps.colour_bar(limit, data.unit)),
     }
 
 
-def panel(joint: str, unit: str, motions: Sequence[Mapping]) -> dict:
+def panel(joint: str, unit: str, motions: Sequence[Traces]) -> dict:
     """A joint's liveliest recording: torque over time, what is missed of it, torque over position and over speed."""
-    motion = max(motions, key=lambda m: _power(m["joints"][joint]["qd"]))
-    step = max(1, -(-len(motion["t"]) // MOST_POINTS))
-    t = motion["t"][::step]
-    data = {name: values[::step] for name, values in motion["joints"][joint].items()}
+    motion = max(motions, key=lambda m: _power(m.joints[joint]["qd"]))
+    step = max(1, -(-len(motion.t) // MOST_POINTS))
+    t = motion.t[::step]
+    data = {name: values[::step] for name, values in motion.joints[joint].items()}
     lines = [svg.Series(name, data[name]) for name in ("measured", *MODELS)]
     missed = [svg.Series(name, _difference(data["measured"], data[name])) for name in MODELS]
     loops = [line for line in lines if line.name != "refit"]
     moves = text.motion_unit(unit)
-    named = lambda what: f"{what} of {joint} in {motion['recording']}"  # noqa: E731
+    named = lambda what: f"{what} of {joint} in {motion.recording}"  # noqa: E731
     return {
         "joint": joint,
-        "recording": motion["recording"],
+        "recording": motion.recording,
         "torque": Markup(svg.line_plot(t, lines, "", f"torque [{unit}]", (540, 150), x_ticks=False,
                                        name=named("Torque over time"))),
         "missed": Markup(svg.line_plot(t, missed, "time [s]", f"missed [{unit}]", (540, 150),
@@ -55,7 +55,7 @@ def panel(joint: str, unit: str, motions: Sequence[Mapping]) -> dict:
     }  # fmt: skip
 
 
-def spectrum(joint: str, data: Mapping, unit: str) -> dict:
+def spectrum(joint: str, data: Spectrum, unit: str) -> dict:
     """Spectrum of what each model misses."""
     series = [svg.Series(name, data[name]) for name in MODELS if name in data]
     name = f"Amplitude spectrum of what each model misses of the torque of {joint}"

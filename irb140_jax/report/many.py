@@ -1,6 +1,5 @@
 """The page of many diagnoses: all units, the worst first, and which effects they have in common."""
 
-import json
 import urllib.parse
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -76,10 +75,10 @@ def _effects(rows: Rows) -> list[dict]:
 
 def _shown(row: Mapping) -> dict:
     """A row as a person reads it."""
-    findings = json.loads(row["findings"] or "[]")
     by_effect: dict[str, list[str]] = {}
-    for finding in findings:
-        by_effect.setdefault(finding["effect"], []).extend(finding["joints"])
+    for word in row["effects"]:
+        slug, _, joints = word.partition(":")
+        by_effect.setdefault(slug, []).extend(joints.split(","))
     named = [f"{text.words(slug)} on {', '.join(dict.fromkeys(joints))}" for slug, joints in by_effect.items()]
     if row["unexplained"]:
         named.append(f"something without a name on {', '.join(dict.fromkeys(row['unexplained']))}")

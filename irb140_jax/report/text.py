@@ -51,14 +51,14 @@ def rounded_like(x: float | None, std: float | None) -> str:
     return f"{round(x, decimals):.{max(decimals, 0)}f}".replace("-", "−")
 
 
-def with_std(value: float, std: float | None) -> str:
+def with_std(value: float | None, std: float | None) -> str:
     """value ± std, both to the digits worth reading."""
     return rounded_like(value, std) + ("" if std is None else f" ± {rounded_like(std, std)}")
 
 
-def interval_90(value: float, std: float | None) -> str:
+def interval_90(value: float | None, std: float | None) -> str:
     """90 % interval of a normal distribution."""
-    if std is None:
+    if value is None or std is None:
         return "–"
     half = HALF_WIDTH_90 * std
     return f"{rounded_like(value - half, std)} to {rounded_like(value + half, std)}"

@@ -9,7 +9,7 @@ from irb140_jax.mismatch.columns.along import prepared, scales_of
 from irb140_jax.mismatch.columns.candidates import Candidate, library
 from irb140_jax.mismatch.experiment_design.undecided import UNKNOWN_NOISE, Column, Undecided
 from irb140_jax.mismatch.regression.noise import ORDER
-from irb140_jax.mismatch.validation.testable import REFERENCE_SHARE, Site, reference
+from irb140_jax.mismatch.validation.testable import REFERENCE_SHARE, Seen, Site, reference
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
@@ -17,7 +17,7 @@ from irb140_jax.robot import Robot
 
 def all_open(
     robot: Robot, effects: Sequence[Effect], smooth: Sequence[Conditioned], band: Band, uncertainty: float
-) -> tuple[Undecided, dict[Site, tuple[float, int]]]:
+) -> tuple[Undecided, Seen]:
     """What is open where nothing was compared: every effect at every site.
 
     Args:

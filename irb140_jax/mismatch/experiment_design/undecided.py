@@ -13,8 +13,9 @@ from irb140_jax.effects.catalogue import known
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gaussian import eliminated
 from irb140_jax.mismatch.regression.gram import LEVELS
+from irb140_jax.mismatch.result import Finding
 from irb140_jax.mismatch.selection.explanation import Explanation
-from irb140_jax.mismatch.validation.testable import REFERENCE_SHARE, VISIBLE, Reference, Site
+from irb140_jax.mismatch.validation.testable import REFERENCE_SHARE, VISIBLE, Reference, Seen
 from irb140_jax.recordings.low_pass import Band
 
 FILE, SCHEMA = "undecided.npz", 1
@@ -105,9 +106,8 @@ class Undecided:
 
 
 def undecided(
-    ex: Explanation, findings: Sequence[dict[str, Any]], seen: dict[Site, tuple[float, int]], matters: Reference,
-    band: Band, uncertainty: float,
-) -> Undecided:  # fmt: skip
+    ex: Explanation, findings: Sequence[Finding], seen: Seen, matters: Reference, band: Band, uncertainty: float
+) -> Undecided:
     """What is open after a diagnosis.
 
     Args:
@@ -124,12 +124,12 @@ def undecided(
     loose = tuple(c for c in ex.chosen if ex.data.candidates[c].is_inertials)
     pairs = []
     for f in findings:
-        site = tuple(names.index(j) for j in f["joints"])
-        at = next(c for c in physics if _key(ex.data.candidates[c]) == (f["effect"], site))
-        for a in f["alternatives"]:
-            rival = _rival(ex, at, a["effect"])
+        site = tuple(names.index(j) for j in f.joints)
+        at = next(c for c in physics if _key(ex.data.candidates[c]) == (f.effect, site))
+        for a in f.alternatives:
+            rival = _rival(ex, at, a.effect)
             if rival:
-                pairs.append((site, f["effect"], a["effect"], a["probability"], at, rival))
+                pairs.append((site, f.effect, a.effect, a.probability, at, rival))
     beside = lambda at: table.of(c for c in physics if c != at)  # noqa: E731
     made = tuple(
         Pair(site, named, slug, p, beside(at), table.sets(ex, (at,)), table.sets(ex, rival))

@@ -1,6 +1,4 @@
-"""From an explanation to findings: parameters with intervals, evidence, alternatives, and what can't be tested."""
-
-from typing import Any
+"""From an explanation to findings: parameters with intervals, evidence, and alternatives."""
 
 import numpy as np
 from scipy import special
@@ -8,6 +6,7 @@ from scipy import special
 from irb140_jax.effects import Effect
 from irb140_jax.effects.base import separating_motion
 from irb140_jax.mismatch.output.certain import certain
+from irb140_jax.mismatch.result import Alternative, Estimate, Evidence, Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.mismatch.selection.selected import NAMED
 from irb140_jax.mismatch.selection.space import RARE
@@ -18,8 +17,8 @@ from irb140_jax.robot import Robot
 LEAST_PROBABILITY = 0.02  # of an alternative that is listed
 
 
-def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
-    """The contract's findings, strongest first."""
+def findings(robot: Robot, ex: Explanation) -> list[Finding]:
+    """The findings, strongest first."""
     post = ex.posterior()
     w = post.mean * ex.data.scale[post.columns]
     cov = post.cov * np.outer(ex.data.scale[post.columns], ex.data.scale[post.columns])
@@ -29,22 +28,15 @@ def findings(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
         if c.is_inertials:
             continue
         values = parameters_of(robot, ex, index, w[rows], cov[rows, rows])
-        names = ", ".join(robot.joint_names[j] for j in c.joints)
-        units = {k: v["unit"] for k, v in values.items()}
-        out.append({
-            "effect": c.slug,
-            "joints": [robot.joint_names[j] for j in c.joints],
-            "where": c.effect.sentence(names, {k: v["value"] for k, v in values.items()}, units),
-            "parameters": values,
-            "evidence": {
-                "log_odds": _log_odds(ex, index),
-                "probability": ex.probability(index),
-                "heldout_gain": gains[index],
-            },
-            "certain": certain(robot, ex, index, w[rows], cov[rows, rows], gains[index]),
-            "alternatives": _alternatives(ex, index),
-        })  # fmt: skip
-    return sorted(out, key=lambda f: -f["evidence"]["log_odds"])
+        joints = tuple(robot.joint_names[j] for j in c.joints)
+        numbers, units = {k: v.value or 0.0 for k, v in values.items()}, {k: v.unit for k, v in values.items()}
+        odds, gain = _log_odds(ex, index), gains[index]
+        out.append((odds, Finding(
+            c.slug, joints, c.effect.sentence(", ".join(joints), numbers, units), values,
+            Evidence(odds, ex.probability(index), gain),
+            certain(robot, ex, index, w[rows], cov[rows, rows], gain), _alternatives(ex, index),
+        )))  # fmt: skip
+    return [finding for _, finding in sorted(out, key=lambda one: -one[0])]
 
 
 def torque_scale_odds(ex: Explanation) -> tuple[float, float]:
@@ -56,28 +48,23 @@ def torque_scale_odds(ex: Explanation) -> tuple[float, float]:
     return float(odds), float(special.expit(odds))
 
 
-def torque_scale_finding(robot: Robot, ex: Explanation) -> list[dict[str, Any]]:
+def torque_scale_finding(robot: Robot, ex: Explanation) -> list[Finding]:
     """The torque of all joints logged too large or too small by one factor, where that is probable."""
     odds, probability = torque_scale_odds(ex)
     if not ex.scaled:
         return []
     w, std = ex.torque_scale()
     gain, spread, way = 1.0 / (1.0 + w), std / (1.0 + w) ** 2, "large" if w > 0 else "small"
-    return [{
-        "effect": "torque_gain",
-        "joints": list(robot.joint_names),
-        "where": (
-            f"all joints: in proportion to the rigid-body torque; the real torque is {gain:.3g} times the logged one"
-        ),
-        "parameters": {"gain": {"value": gain, "std": spread, "unit": "1"}},
+    return [Finding(
+        "torque_gain", robot.joint_names,
+        f"all joints: in proportion to the rigid-body torque; the real torque is {gain:.3g} times the logged one",
+        {"gain": Estimate(gain, spread, "1")},
         # Without it refitted inertials explain the same torque, so it removes no error on unseen data.
-        "evidence": {"log_odds": odds, "probability": probability, "heldout_gain": 0.0},
-        "certain": (
-            f"The logged torque of all joints is {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} for the stated "
-            "masses; only a known payload can tell wrong torque constants from masses that are all wrong by one factor."
-        ),
-        "alternatives": [],
-    }]  # fmt: skip
+        Evidence(odds, probability, 0.0),
+        f"The logged torque of all joints is {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} for the stated masses; "
+        "only a known payload can tell wrong torque constants from masses that are all wrong by one factor.",
+        (),
+    )]  # fmt: skip
 
 
 def _log_odds(ex: Explanation, index: int) -> float:
@@ -92,7 +79,7 @@ def _log_odds(ex: Explanation, index: int) -> float:
     return ex.log_posterior(ex.chosen, joints) - max(ex.log_posterior(o, joints) for o in options)
 
 
-def _alternatives(ex: Explanation, index: int) -> list[dict[str, Any]]:
+def _alternatives(ex: Explanation, index: int) -> tuple[Alternative, ...]:
     """Effects that may be true in a finding's place, and what to record; a part of its law is no alternative to it."""
     c, effects = ex.data.candidates[index], ex.lib.effects
     best: dict[str, float] = {}
@@ -103,13 +90,10 @@ def _alternatives(ex: Explanation, index: int) -> list[dict[str, Any]]:
     others = {slug: p for slug, p in best.items() if slug not in parts}
     alone = {slug: p for slug, p in parts.items() if NAMED * p > sum(others.values())}
     stays = [effects[slug] for slug in parts if slug not in alone]
-    return [
-        {
-            "effect": slug, "probability": p,
-            "separate_by": _separation(c.effect, effects[slug], [e for e in stays if e.slug != slug]),
-        }
+    return tuple(
+        Alternative(slug, p, _separation(c.effect, effects[slug], [e for e in stays if e.slug != slug]))
         for slug, p in sorted((others | alone).items(), key=lambda item: -item[1])
-    ]  # fmt: skip
+    )
 
 
 def _separation(one: Effect, other: Effect, stays: list[Effect]) -> str:
@@ -117,22 +101,3 @@ def _separation(one: Effect, other: Effect, stays: list[Effect]) -> str:
     both = " and ".join(s.title for s in stays)
     present = f" ({both} {'is' if len(stays) == 1 else 'are'} there in either case)" if stays else ""
     return f"Record {motion}{present}."
-
-
-def ranking(robot: Robot, ex: Explanation, most: int = 25) -> list[dict[str, Any]]:
-    """Candidates by evidence, each alone and given the explanation, for the report."""
-    rows = []
-    chosen = {(ex.data.candidates[c].slug, ex.data.candidates[c].joints) for c in ex.chosen}
-    # Alone: over nothing but the inertials, with noise and discrepancy of the final model.
-    chi = ex.gains((), range(len(ex.data.candidates))) - ex.space.log_prior - ex.space.kinds.one_more(())
-    best: dict[tuple[str, tuple[int, ...]], float] = {}
-    for c, gain in zip(ex.data.candidates, chi, strict=True):
-        best[c.slug, c.joints] = max(best.get((c.slug, c.joints), -np.inf), float(gain))
-    possible = [(key, gain) for key, gain in best.items() if np.isfinite(gain)]
-    for (slug, joints), gain in sorted(possible, key=lambda item: -item[1])[:most]:
-        rows.append({
-            "effect": slug, "joints": [robot.joint_names[j] for j in joints], "delta_bic": 2.0 * gain,
-            "probability": 1.0 if (slug, joints) in chosen else 0.0, "chosen": (slug, joints) in chosen,
-            "stage": "alone",
-        })  # fmt: skip
-    return rows

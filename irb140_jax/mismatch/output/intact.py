@@ -29,14 +29,6 @@ def refuse(path: pathlib.Path, error: Exception) -> NoReturn:
     raise InputError(f"{path}: can't be read as part of a diagnosis ({said}); diagnose again") from error
 
 
-def check_schema(data: Any, expected: int) -> None:
-    """Raise a `ValueError` unless `data` is an object of this schema."""
-    if not isinstance(data, dict) or "schema" not in data:
-        raise ValueError("it states no schema")
-    if data["schema"] != expected:
-        raise ValueError(f"it has schema {data['schema']!r}, this version reads and writes schema {expected}")
-
-
 def check_model(model: CorrectedModel) -> None:
     """Raise a `ValueError` unless the numbers of a model fit together and are numbers."""
     n = model.robot.n

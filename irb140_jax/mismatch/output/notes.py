@@ -5,33 +5,28 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.mismatch.regression.nuisances import SCALED
+from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.mismatch.validation.held_out import HeldOut
-from irb140_jax.recordings.condition import Conditioned
-from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
 FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
 NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
 
 
-def notes(
-    robot: Robot, smooth: Sequence[Conditioned], band: Band, uncertainty: float, rows: np.ndarray, judged: np.ndarray
-) -> list[str]:
-    """The contract's `notes`, a sentence each.
+def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]:
+    """What every diagnosis says, a sentence each.
 
     Args:
-        robot: The nominal model, whose reader has notes of its own.
-        smooth: The conditioned recordings with theirs.
-        band: Of the comparison.
+        data: The model and the conditioned recordings, which have notes of their own.
         uncertainty: Relative standard deviation of the inertials.
-        rows: Rows in which each joint moves, shape (n,).
         judged: Joints of which enough rows tell, shape (n,).
     """
+    robot, band = data.robot, data.band
     out = [f"Model {robot.name}: {_sentence(note)}" for note in robot.notes]
-    out += [f"{r.source}: {_sentence(note)}" for r in smooth for note in r.notes]
-    for name, count, enough in zip(robot.joint_names, rows, judged, strict=True):
+    out += [f"{r.source}: {_sentence(note)}" for r in data.smooth for note in r.notes]
+    for name, count, enough in zip(robot.joint_names, data.rows, judged, strict=True):
         if not enough:
             out.append(f"{name} is not judged: it moves in only {count} usable rows; record motion of this joint.")
     out.append(

@@ -11,6 +11,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from irb140_jax.mismatch.result import DiagnosedRecording, DiagnosedRobot, Provenance
 from irb140_jax.recordings.recording import Recording, content_hash
 from irb140_jax.robot import Robot
 
@@ -19,8 +20,8 @@ EPOCH = "SOURCE_DATE_EPOCH"  # seconds since 1970; https://reproducible-builds.o
 
 def provenance(
     robot: Robot, recordings: Sequence[Recording], options: Mapping[str, Any], words: Sequence[str] = ()
-) -> dict[str, Any]:
-    """The contract's `provenance`.
+) -> Provenance:
+    """Where a diagnosis comes from.
 
     The same input gives the same `diagnosis.json` on the same day: `date` holds no time of day, and `SOURCE_DATE_EPOCH`
     sets it.  Compare diagnoses of different days without `date`.
@@ -33,21 +34,20 @@ def provenance(
     """
     share = f"{options['inertial_uncertainty']:g}"
     command = ["irb140", "diagnose", *(r.source for r in recordings), *words, "--inertial-uncertainty", share]
-    return {
-        "version": _version(),
-        "command": shlex.join(command),  # but for the folder that it is written to
-        "robot": {"name": robot.name, "joints": list(robot.joint_names), "sha256": _hash_of_robot(robot)},
-        "recordings": [_of_recording(r) for r in recordings],
-        "options": dict(options),
-        "date": _today(),
-    }
+    return Provenance(
+        version=_version(),
+        command=shlex.join(command),  # but for the folder that it is written to
+        robot=DiagnosedRobot(robot.name, robot.joint_names, _hash_of_robot(robot)),
+        recordings=tuple(_of_recording(r) for r in recordings),
+        options=dict(options),
+        date=_today(),
+    )
 
 
-def _of_recording(r: Recording) -> dict[str, Any]:
+def _of_recording(r: Recording) -> DiagnosedRecording:
     duration = float(r.t[-1] - r.t[0])
     rate = (len(r.t) - 1) / duration
-    sha256 = r.sha256 or content_hash(r)
-    return {"file": r.source, "sha256": sha256, "rows": len(r.t), "rate": rate, "duration": duration}
+    return DiagnosedRecording(r.source, r.sha256 or content_hash(r), len(r.t), rate, duration)
 
 
 def _hash_of_robot(robot: Robot) -> str:

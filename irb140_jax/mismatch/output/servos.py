@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -10,6 +9,7 @@ from scipy import stats
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.regression.nuisances import FIXED
 from irb140_jax.mismatch.regression.servo import NAMES
+from irb140_jax.mismatch.result import Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.recordings.condition import INEXACT, Commanded, Conditioned
@@ -77,35 +77,35 @@ def _rms(torque: Sequence[np.ndarray], ex: Explanation) -> np.ndarray:
     return np.sqrt(sum(np.sum(np.where(u, x, 0.0) ** 2, axis=0) for x, u in zip(torque, use, strict=True)) / rows)
 
 
-def of_servos(ex: Explanation, servo: Commanded | None, found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def of_servos(ex: Explanation, servo: Commanded | None, found: list[Finding]) -> list[Finding]:
     """Findings of servo logs, each with the errors of the drive's gains or clock that would look the same."""
     if servo is None:
         return found
     out, names = [], list(ex.lib.robot.joint_names)
     for f in found:
         said = ""
-        if f["effect"] == "viscous_friction":
-            j = names.index(f["joints"][0])
+        if f.effect == "viscous_friction":
+            j = names.index(f.joints[0])
             off = float(servo.drive.kd_width[j] * _joint_nuisances(ex, j)[0][DRIVE_KD])
-            both = f["parameters"]["viscous"]["value"] + float(servo.drive.kd[j]) + off
+            both = (f.parameters["viscous"].value or 0.0) + float(servo.drive.kd[j]) + off
             said = (
                 f" It can't be told from the drive's Kd, which is taken as {servo.drive.kd[j]:.3g}: only the sum of "
                 f"both, {both:.3g}, is known; recordings with two different Kd, or of unpowered motion, would tell "
                 "them apart."
             )
-        elif f["effect"] == "torque_gain":
+        elif f.effect == "torque_gain":
             said = " On a servo this means that the stated Kp is wrong, or that the masses of the model are."
-        elif f["effect"] in LAGS:
+        elif f.effect in LAGS:
             said = (
                 " The fit can't tell its cause: the drive may apply commands late, its torque may lag, or the clocks "
                 "may be out of step."
             )
-        elif f["effect"] == "rotor_inertia":
+        elif f.effect == "rotor_inertia":
             said = (
                 " This number depends on how late the drive applies its commands, because a delay shifts the torque's "
                 "phase."
             )
-        out.append(f | {"certain": f["certain"] + said})
+        out.append(dataclasses.replace(f, certain=f.certain + said))
     return out
 
 

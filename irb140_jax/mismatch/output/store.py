@@ -1,5 +1,6 @@
 """A diagnosis on disk: what the contract fixes, what `predict` needs, what the report draws."""
 
+import dataclasses
 import json
 import pathlib
 from collections.abc import Sequence
@@ -12,22 +13,53 @@ from irb140_jax.mismatch.corrected.native import save_native
 from irb140_jax.mismatch.corrected.robot import CorrectedRobot, corrected_robot
 from irb140_jax.mismatch.experiment_design import undecided
 from irb140_jax.mismatch.experiment_design.undecided import Undecided, save_undecided
-from irb140_jax.mismatch.output.intact import check_model, check_schema, check_undecided, refuse
-from irb140_jax.mismatch.result import Result
+from irb140_jax.mismatch.output.intact import check_model, check_undecided, refuse
+from irb140_jax.mismatch.output.views import Views
+from irb140_jax.mismatch.records import check_schema
+from irb140_jax.mismatch.result import Diagnosis
 
 DIAGNOSIS, MODEL, VIEWS, MOTION = "diagnosis.json", "model.json", "views.json", "motion.json"
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """A diagnosis with all that is stored beside it.
+
+    Attributes:
+        diagnosis: What it says.
+        model: The corrected model, for predictions.
+        views: Data for the report's figures.
+        undecided: What is open, for the design of a motion that decides it.
+    """
+
+    diagnosis: Diagnosis
+    model: CorrectedModel
+    views: Views
+    undecided: Undecided
 
 
 def save(result: Result, folder: pathlib.Path) -> None:
     """Write diagnosis, model, views, the corrected model as MJCF and what is undecided into an existing folder."""
     save_undecided(result.undecided, folder)
     save_native(result.model, folder)
-    motion = {MOTION: result.views["motion"]} if result.views.get("motion") else {}
-    views = {key: value for key, value in result.views.items() if key != "motion"}
-    files = {DIAGNOSIS: result.diagnosis, MODEL: to_json(result.model), VIEWS: views} | motion
+    files = {DIAGNOSIS: result.diagnosis.to_json(), MODEL: to_json(result.model), VIEWS: result.views.to_json()}
+    files |= {MOTION: result.views.motion} if result.views.motion else {}
     for name, content in files.items():
         text = json.dumps(content, indent=1, allow_nan=False) + "\n"
         (folder / name).write_text(text, encoding="utf-8")
+
+
+def load_diagnosis(folder: str | pathlib.Path) -> Diagnosis:
+    """Read what a diagnosis says.
+
+    Raises:
+        InputError: The folder holds no whole diagnosis of this version.
+    """
+    path = pathlib.Path(folder) / DIAGNOSIS
+    try:
+        return Diagnosis.from_json(json.loads(path.read_text(encoding="utf-8")))
+    except Exception as error:
+        refuse(path, error)
 
 
 def load_model(folder: str | pathlib.Path, effects: Sequence[Effect] = ()) -> CorrectedModel:

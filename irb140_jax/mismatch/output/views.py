@@ -1,10 +1,14 @@
 """Where recording and model part: over position and speed, in time, in frequency, link by link.  Data for people."""
 
+import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from scipy import signal
 
+from irb140_jax.mismatch.output.inertials import LinkShift
+from irb140_jax.mismatch.records import plain
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.robot import Robot
@@ -14,9 +18,100 @@ FEW = 4  # rows below which a bin stays empty
 TRACE_POINTS = 900  # of a joint along a recording: more than a figure can show
 FEWEST_POINTS = 150  # below which a motion of half a minute can't be recognised
 MOST_NUMBERS = 30_000  # points of all joints and recordings together: some 1.5 MB in the report
+MOST_RANKED = 25
+MODELS = ("nominal", "refit", "corrected")
+Grid = list[list[float | None]]
+Curves = dict[str, list[float | None]]  # by what they are of, for example "measured" or "corrected"
+Spectrum = dict[str, list[float]]
 
 
-def heat_map(q: np.ndarray, qd: np.ndarray, edges: tuple[np.ndarray, np.ndarray], r: np.ndarray) -> list[list]:
+@dataclasses.dataclass(frozen=True)
+class Maps:
+    """Mean residual of a joint over position (rows) and speed (columns); None where the motion never was.
+
+    Attributes:
+        q_edges: Of the bins of position [rad or m].
+        qd_edges: Of the bins of speed [rad/s or m/s].
+        nominal: Residual of the model as given, in `unit`.
+        corrected: Of the corrected model, in `unit`.
+        unit: "N m" or "N".
+    """
+
+    q_edges: list[float]
+    qd_edges: list[float]
+    nominal: Grid
+    corrected: Grid
+    unit: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Traces:
+    """A recording over time.
+
+    Attributes:
+        recording: Its name.
+        t: Time [s].
+        joints: By joint: "q" [rad or m], "qd", and the torques "measured" and of each model [N m or N].
+    """
+
+    recording: str
+    t: list[float]
+    joints: dict[str, Curves]
+
+
+@dataclasses.dataclass(frozen=True)
+class Ranked:
+    """A candidate by its evidence.
+
+    Attributes:
+        effect: Its slug.
+        joints: Names of its joints.
+        delta_bic: Twice the log odds of the data with it.
+        probability: 1 if it is among the findings, else 0.
+        chosen: Whether it is.
+        stage: "alone": over nothing but the inertials.
+    """
+
+    effect: str
+    joints: tuple[str, ...]
+    delta_bic: float
+    probability: float
+    chosen: bool
+    stage: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Views:
+    """What the report draws.
+
+    Attributes:
+        joints: Their names.
+        recordings: Their names.
+        maps: Residuals over position and speed, by joint.
+        motions: The recordings over time.
+        ranking: Candidates, the strongest first.
+        residual_spectrum: By joint: frequencies "f" [Hz], and residuals of each model [N m/sqrt(Hz)].
+        inertials: What refitting did to each link.
+        notes: Those of the diagnosis.
+        motion: What motion.json holds; None where nothing was simulated.
+    """
+
+    joints: tuple[str, ...]
+    recordings: tuple[str, ...]
+    maps: dict[str, Maps] = dataclasses.field(default_factory=dict)
+    motions: tuple[Traces, ...] = ()
+    ranking: tuple[Ranked, ...] = ()
+    residual_spectrum: dict[str, Spectrum] = dataclasses.field(default_factory=dict)
+    inertials: tuple[LinkShift, ...] = ()
+    notes: tuple[str, ...] = ()
+    motion: dict[str, Any] | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """The contents of views.json."""
+        return {name: value for name, value in plain(self).items() if name != "motion"}
+
+
+def heat_map(q: np.ndarray, qd: np.ndarray, edges: tuple[np.ndarray, np.ndarray], r: np.ndarray) -> Grid:
     """Mean residual by position (rows) and speed (columns); None where the motion never was."""
     count, _, _ = np.histogram2d(q, qd, bins=edges)
     total, _, _ = np.histogram2d(q, qd, bins=edges, weights=r)
@@ -26,7 +121,7 @@ def heat_map(q: np.ndarray, qd: np.ndarray, edges: tuple[np.ndarray, np.ndarray]
     ]
 
 
-def maps(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Any]:
+def maps(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Maps]:
     """Residual of nominal and corrected model over position and speed of each joint."""
     out = {}
     for j, name in enumerate(robot.joint_names):
@@ -38,17 +133,15 @@ def maps(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Any]:
         top = np.max(np.abs(qd))
         edges = (np.linspace(q.min(), q.max() + 1e-12, BINS + 1), np.linspace(-top, top, BINS + 1))
         nominal, corrected = (
-            np.concatenate([r[u, j] for r, u in zip(x, use, strict=True)]) for x in (proof.nominal, proof.corrected)
+            heat_map(q, qd, edges, np.concatenate([r[u, j] for r, u in zip(x, use, strict=True)]))
+            for x in (proof.nominal, proof.corrected)
         )
-        out[name] = {
-            "q_edges": edges[0].tolist(), "qd_edges": edges[1].tolist(),
-            "nominal": heat_map(q, qd, edges, nominal), "corrected": heat_map(q, qd, edges, corrected),
-            "unit": "N" if robot.is_slide[j] else "N m",
-        }  # fmt: skip
+        unit = "N" if robot.is_slide[j] else "N m"
+        out[name] = Maps(edges[0].tolist(), edges[1].tolist(), nominal, corrected, unit)
     return out
 
 
-def motions(robot: Robot, ex: Explanation, proof: HeldOut, names: list[str]) -> list[dict[str, Any]]:
+def motions(robot: Robot, ex: Explanation, proof: HeldOut, names: Sequence[str]) -> tuple[Traces, ...]:
     """Position, speed, measured and modelled torque of every joint along every recording, on data the fit did not see.
 
     Thinned evenly, so that a report of many recordings and joints stays a file that opens at once.
@@ -62,19 +155,19 @@ def motions(robot: Robot, ex: Explanation, proof: HeldOut, names: list[str]) -> 
             measured = s.tau[rows, j]
             joints[name] = {
                 "q": s.q[rows, j].tolist(), "qd": s.qd[rows, j].tolist(), "measured": measured.tolist(),
-                **{k: (measured - getattr(proof, k)[r][rows, j]).tolist() for k in ("nominal", "refit", "corrected")},
+                **{k: (measured - getattr(proof, k)[r][rows, j]).tolist() for k in MODELS},
             }  # fmt: skip
-        out.append({"recording": source, "t": s.t[rows].tolist(), "joints": joints})
-    return out
+        out.append(Traces(source, s.t[rows].tolist(), joints))
+    return tuple(out)
 
 
-def spectra(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Any]:
+def spectra(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Spectrum]:
     """Amplitude spectral density of the residuals of each joint [N m/sqrt(Hz)], averaged over the recordings."""
     out = {}
     length = min(256, *(len(s.t) for s in ex.data.stretches))
     for j, name in enumerate(robot.joint_names):
         out[name] = {}
-        for kind in ("nominal", "refit", "corrected"):
+        for kind in MODELS:
             density = []
             for s, r in zip(ex.data.stretches, getattr(proof, kind), strict=True):
                 rate = (len(s.t) - 1) / (s.t[-1] - s.t[0])
@@ -83,3 +176,19 @@ def spectra(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Any]:
             out[name]["f"] = f.tolist()
             out[name][kind] = np.sqrt(np.mean(density, axis=0)).tolist()
     return out
+
+
+def ranking(robot: Robot, ex: Explanation) -> tuple[Ranked, ...]:
+    """Candidates by evidence, each alone, the strongest first."""
+    rows = []
+    chosen = {(ex.data.candidates[c].slug, ex.data.candidates[c].joints) for c in ex.chosen}
+    # Alone: over nothing but the inertials, with noise and discrepancy of the final model.
+    chi = ex.gains((), range(len(ex.data.candidates))) - ex.space.log_prior - ex.space.kinds.one_more(())
+    best: dict[tuple[str, tuple[int, ...]], float] = {}
+    for c, gain in zip(ex.data.candidates, chi, strict=True):
+        best[c.slug, c.joints] = max(best.get((c.slug, c.joints), -np.inf), float(gain))
+    possible = [(key, gain) for key, gain in best.items() if np.isfinite(gain)]
+    for (slug, joints), gain in sorted(possible, key=lambda item: -item[1])[:MOST_RANKED]:
+        named, among = tuple(robot.joint_names[j] for j in joints), (slug, joints) in chosen
+        rows.append(Ranked(slug, named, 2.0 * gain, float(among), among, "alone"))
+    return tuple(rows)

@@ -1,18 +1,81 @@
-"""Which recordings are long enough to be compared with the model, and whether any joint moves enough in them."""
+"""What is compared: recordings that are long enough, conditioned, and whether any joint moves enough in them."""
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from irb140_jax.mismatch.regression.assemble import FEWEST_ROWS as FEWEST_OF_A_JOINT
-from irb140_jax.recordings.condition import Conditioned, choose_band, conditioned
+from irb140_jax.recordings.channels import with_lost_torque_marked
+from irb140_jax.recordings.check import MOVING, checked_numbers
+from irb140_jax.recordings.condition import Commanded, Conditioned, choose_band, conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.repeats import with_motions_numbered
+from irb140_jax.recordings.repeats import with_motions_numbered, without_copies
+from irb140_jax.recordings.servo import with_servo_torques
 from irb140_jax.robot import Robot
 
 FEWEST_ROWS = 80  # low-passed rows of all recordings together, below which nothing can be said
 FEWEST_OF_ONE = 16  # of one recording: fewer have no blocks to leave out, and no noise to measure
+
+
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """A model and what it is compared with.
+
+    Attributes:
+        robot: The nominal model.
+        recordings: With torque, as far as they are long enough.
+        smooth: The same, conditioned.
+        band: Of the comparison.
+        servo_notes: What was assumed of servos, a sentence each.
+        notes: What was left out or counts only once, a sentence each.
+    """
+
+    robot: Robot
+    recordings: list[Recording]
+    smooth: list[Conditioned]
+    band: Band
+    servo_notes: list[str]
+    notes: list[str]
+
+    @property
+    def names(self) -> list[str]:
+        """Of the recordings."""
+        return [r.source for r in self.recordings]
+
+    @property
+    def servo(self) -> Commanded | None:
+        """Commands and drive, where the recordings held these in place of torque."""
+        return self.smooth[0].servo
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Low-passed rows in which each joint moves and nothing is lost, over all recordings, shape (n,)."""
+        return usable_rows(self.smooth, self.band)
+
+
+def comparison(
+    robot: Robot, recordings: Sequence[Recording], uncertainty: float, progress: Callable[[str], None]
+) -> Comparison:
+    """Prepare recordings for the comparison.
+
+    Args:
+        robot: The nominal model.
+        recordings: At least one, of this robot.
+        uncertainty: Relative standard deviation of its inertials.
+        progress: Told what is being done.
+
+    Raises:
+        RecordingError: A recording is too short for any filter, or holds what is no number.
+    """
+    moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
+    recordings, servo_notes = with_servo_torques(recordings, robot, uncertainty)
+    recordings = [with_lost_torque_marked(checked_numbers(r), moves, robot) for r in recordings]
+    recordings, twice = without_copies(recordings)
+    progress("smoothing and differentiating the positions")
+    band, recordings, smooth, again = comparable(robot, recordings)
+    return Comparison(robot, recordings, smooth, band, servo_notes, twice + again)
 
 
 def comparable(

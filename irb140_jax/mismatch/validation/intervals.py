@@ -1,7 +1,6 @@
 """Physical parameters of a finding, and how well the data know them."""
 
 from collections.abc import Callable
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.scout import left_over
+from irb140_jax.mismatch.result import Estimate
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.robot import Robot
 
@@ -20,7 +20,7 @@ UNSEEN = 3.0  # a direction taken at random has six times as much of what isn't 
 
 def parameters_of(
     robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray
-) -> dict[str, Any]:
+) -> dict[str, Estimate]:
     """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt.
 
     Args:
@@ -31,7 +31,7 @@ def parameters_of(
         cov: Their covariance, shape (k, k).
 
     Returns:
-        By parameter: `value` and `std` in SI units, and the `unit`.
+        By the parameter's name, in SI units.
     """
     c = ex.data.candidates[index]
     value = _physical(c, w)
@@ -47,12 +47,9 @@ def parameters_of(
         variance = variance + np.sum((alike - value) ** 2, axis=0) / 2.0
     slide = robot.is_slide[c.joints[0]]
     return {
-        parameter.name: {
-            "value": float(value[i]), "std": float(np.sqrt(max(variance[i], 0.0))),
-            "unit": parameter.unit_of(slide),
-        }
-        for i, parameter in enumerate(c.effect.law.parameters)
-    }  # fmt: skip
+        parameter.name: Estimate(float(x), float(np.sqrt(max(v, 0.0))), parameter.unit_of(slide))
+        for parameter, x, v in zip(c.effect.law.parameters, value, variance, strict=True)
+    }
 
 
 def _variance_of(

@@ -4,8 +4,8 @@ Along a slow motion hardly anything is large, so a share of the torque there say
 heavy as the arm.  Strengths are therefore those of a lively motion of the same robot within its limits.
 """
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy import ndimage
@@ -14,6 +14,7 @@ from irb140_jax.effects import Effect, Scales
 from irb140_jax.mismatch.columns.along import columns_along, prepared, unbounded, without
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.mismatch.regression.gaussian import eliminated
+from irb140_jax.mismatch.result import NotTestable
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.excite import Excitation, fourier_motion, within
@@ -37,6 +38,7 @@ class AtSite(Protocol):
 ROUNDED = 3.0  # times the speed of rest: from there sign(qd) is right to half a percent
 LEAK = 0.1  # [s] over which the low-pass spreads what happens at a reversal
 Site = tuple[str, tuple[int, ...]]
+Seen = dict[Site, tuple[float, int]]  # standard deviations by which an effect stands out, and its candidate
 
 
 class Reference(NamedTuple):
@@ -105,7 +107,7 @@ def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
     return Conditioned(*moving, rest_speed, np.zeros_like(rest_speed), direction, np.zeros_like(motion.q), ())
 
 
-def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, int]]:
+def visibility(ex: Explanation, matters: Reference) -> Seen:
     """Of every effect at every site: how far it would stand out of the noise, and its candidate.
 
     Not of those that are named or part of a named one.
@@ -118,7 +120,7 @@ def visibility(ex: Explanation, matters: Reference) -> dict[Site, tuple[float, i
         Standard deviations and index of the candidate that stands out most.
     """
     H = ex.near(ex.chosen, np.arange(len(ex.data.scale) - ex.data.nuisances))
-    seen: dict[Site, tuple[float, int]] = {}
+    seen: Seen = {}
     for i, c in enumerate(ex.data.candidates):
         if c.is_inertials or any(_related(c, m) for m in ex.members):
             continue
@@ -162,16 +164,15 @@ def _related(one: AtSite, member: AtSite) -> bool:
 
 
 def not_testable(
-    robot: Robot, found: set[str], seen: dict[Site, tuple[float, int]], effects: Sequence[Effect]
-) -> list[dict[str, Any]]:
-    """Effects that this motion could not have shown, with the joints where that is so, as the contract has them."""
+    robot: Robot, found: set[str], seen: Seen, effects: Iterable[Effect]
+) -> tuple[NotTestable, ...]:
+    """Effects that this motion could not have shown, with the joints where that is so."""
     needs = {effect.slug: effect.needs for effect in effects}
     blind: dict[str, set[int]] = {}
     for (slug, joints), (z, _) in seen.items():
         if z < VISIBLE and slug not in found:
             blind.setdefault(slug, set()).update(joints)
-    return [
-        {"effect": slug, "joints": [robot.joint_names[j] for j in sorted(joints)],
-         "needs": f"Needs {needs[slug]}."}
+    return tuple(
+        NotTestable(slug, tuple(robot.joint_names[j] for j in sorted(joints)), f"Needs {needs[slug]}.")
         for slug, joints in sorted(blind.items())
-    ]  # fmt: skip
+    )

@@ -16,6 +16,7 @@ from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
 
+MOST_ROWS = 20_000  # of a joint, of which every second, third ... is taken beyond: a log of an hour has ten times as many
 FEATURES = 60  # random Fourier features a competitor
 WAVES = 50  # along a joint's range, of the competitor that knows position and direction
 SHIFTS = 99  # circular time shifts that make the null
@@ -35,7 +36,7 @@ NEARLY = 2.0 / 3.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Unexplained:
+class Structure:
     """What is left at one joint.
 
     Attributes:
@@ -89,7 +90,7 @@ class Rows(NamedTuple):
         return np.concatenate([a[p] for a, p in zip(arrays, self.pick, strict=True)])
 
 
-def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
+def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
     """Joints whose residual, findings taken off, can be predicted on unseen data."""
     out = []
     torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
@@ -112,7 +113,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Unexplained]:
             p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
             if share >= least and p <= SIGNIFICANT:
                 size = float(np.sqrt(share) * rmse[j])
-                out.append(Unexplained(j, share, p, rivals[best].variable, size))
+                out.append(Structure(j, share, p, rivals[best].variable, size))
                 break
     return out
 
@@ -163,6 +164,8 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
 def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
     """Only the level is divided out, not the colour: a slow structure is exactly what is looked for."""
     pick = [ex.noise.usable(s.use[:, j], j) for s in ex.data.stretches]
+    thin = 1 + sum(int(p.sum()) for p in pick) // MOST_ROWS
+    pick = [p & (np.arange(len(p)) % thin == 0) for p in pick]
     level = np.concatenate([
         ex.noise.total[r, j] * spread(s.unsure[p, j], ex.noise.total[r, j])
         for r, (s, p) in enumerate(zip(ex.data.stretches, pick, strict=True))

@@ -1,0 +1,38 @@
+"""The proof in motion of a diagnosis: each fold's models on what the fold left out."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from irb140_jax.mismatch.corrected.fitted import fitted_model
+from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.motion.proof import proof_in_motion
+from irb140_jax.mismatch.motion.windows import spans
+from irb140_jax.mismatch.regression.sufficient_data import Comparison
+from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.validation.held_out import HeldOut, recordings_of_blocks
+
+
+def motion_unseen(
+    data: Comparison, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], beyond: Sequence[np.ndarray] | None
+) -> dict[str, Any] | None:
+    """What motion.json holds; None where a joint's torque was lost or never logged, so that nothing can be simulated.
+
+    Args:
+        data: Model and recordings.
+        ex: The explanation.
+        proof: The fits without each fold.
+        loose: Candidates of the refit: inertials wrong beyond their stated uncertainty.
+        beyond: What corrected.xml can't hold along each recording, from `beyond_file`; None where unknown.
+    """
+    lost = any(r.torque_lost is not None and r.torque_lost.any() for r in data.recordings)
+    if beyond is None or lost or data.servo is not None:
+        return None
+    unseen = spans([fold.blocks for fold in proof.folds], recordings_of_blocks(ex), [s.t for s in ex.data.stretches])
+
+    def of_fold(k: int) -> CorrectedModel:
+        fold = proof.folds[k]
+        return fitted_model(ex, fold.refit, loose, fold.corrected, fold.scale, data.band)
+
+    return proof_in_motion(data.robot, of_fold, unseen, data.smooth, beyond)

@@ -1,0 +1,155 @@
+"""From what the stages found to a diagnosis and to the data of the report's drawings."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from irb140_jax.effects import Effect
+from irb140_jax.effects.torque_gain import EFFECT as TORQUE_GAIN
+from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.corrected.native import native_gap
+from irb140_jax.mismatch.output import views
+from irb140_jax.mismatch.output.findings import torque_scale_finding
+from irb140_jax.mismatch.output.inertials import link_shifts
+from irb140_jax.mismatch.output.notes import discrepancy_notes, friction_notes, gap_notes, inertial_notes, notes
+from irb140_jax.mismatch.output.servos import command_notes, harmful_notes, of_servos, servo_sentence
+from irb140_jax.mismatch.output.summary import open_sentence, summary, verdict
+from irb140_jax.mismatch.records import rounded
+from irb140_jax.mismatch.regression.sensor_noise import coarse_positions
+from irb140_jax.mismatch.regression.sufficient_data import Comparison
+from irb140_jax.mismatch.result import Diagnosis, Finding, Fit, Provenance, Unexplained
+from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.mismatch.validation.testable import Seen, not_testable
+from irb140_jax.mismatch.validation.undecided_joints import torque_size, undecidable
+from irb140_jax.mismatch.validation.unexplained import Structure
+from irb140_jax.robot import Robot
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """What the stages of a diagnosis found, before it is put into words.
+
+    Attributes:
+        data: Model and recordings.
+        uncertainty: Relative standard deviation of the inertials.
+        sensors: What torque sensors and encoders leave in the comparison, shape (n,) each [N m or N].
+        ex: The explanation.
+        proof: Errors on unseen data.
+        findings: Named effects.
+        rest: Structure that no effect explains.
+        seen: How well every other effect could be seen.
+        model: The corrected model.
+        harmful: Joints whose discrepancy is left out because it makes the error larger, shape (n,).
+        beyond: What corrected.xml lacks of the model's torque along each recording, (T, n) [N m or N]; None where
+            unknown.
+    """
+
+    data: Comparison
+    uncertainty: float
+    sensors: tuple[np.ndarray, np.ndarray]
+    ex: Explanation
+    proof: HeldOut
+    findings: Sequence[Finding]
+    rest: Sequence[Structure]
+    seen: Seen
+    model: CorrectedModel
+    harmful: np.ndarray
+    beyond: Sequence[np.ndarray] | None
+
+
+def document(of: Found, origin: Provenance) -> Diagnosis:
+    """The diagnosis."""
+    robot, scatter = of.data.robot, np.hypot(*of.sensors)
+    logged = [s.tau for s in of.ex.data.stretches]
+    missing = undecidable(robot, of.proof, logged, scatter, of.data.band)
+    found = of_servos(of.ex, of.data.servo, [*of.findings, *torque_scale_finding(robot, of.ex)])
+    fit, shifts = fit_by_joint(robot, of.proof, scatter), link_shifts(robot, of.ex)
+    effects = {TORQUE_GAIN.slug: TORQUE_GAIN} | of.ex.lib.effects
+    kind = verdict(of.ex, of.proof, found, of.rest, missing)
+    said = summary(kind, found, of.rest, fit, shifts, robot, len(of.data.recordings), missing.values(), effects)
+    return rounded(Diagnosis(
+        verdict=kind,
+        findings=tuple(found),
+        unexplained=tuple(_unexplained(robot, s) for s in of.rest),
+        not_testable=not_testable(robot, {f.effect for f in found}, of.seen, effects.values()),
+        fit=fit,
+        notes=tuple(_notes(of, missing, torque_size(of.proof, logged))),
+        provenance=origin,
+        summary=said + servo_sentence(of.data.recordings),
+    ))  # fmt: skip
+
+
+def document_of_nothing(
+    data: Comparison, reason: str, seen: Seen, effects: Sequence[Effect], uncertainty: float, origin: Provenance
+) -> Diagnosis:
+    """The diagnosis where no joint could be compared: undecided, nothing refitted, and every effect open.
+
+    Args:
+        data: Model and recordings.
+        reason: Why, a sentence without its full stop.
+        seen: Every effect at every site, none of which could be seen.
+        effects: The library.
+        uncertainty: Relative standard deviation of the inertials.
+        origin: Where the diagnosis comes from.
+    """
+    robot = data.robot
+    unjudged = notes(data, uncertainty, np.zeros(robot.n, dtype=bool))
+    return rounded(Diagnosis(
+        verdict="undecided",
+        findings=(),
+        unexplained=(),
+        not_testable=not_testable(robot, set(), seen, effects),
+        fit={name: Fit() for name in robot.joint_names},
+        notes=(f"{reason}.", *data.servo_notes, *data.notes, *unjudged),
+        provenance=origin,
+        summary=f"{open_sentence(len(data.recordings), robot)} {reason}.",
+    ))  # fmt: skip
+
+
+def report_views(of: Found, said: tuple[str, ...], motion: dict[str, Any] | None) -> views.Views:
+    """What the report draws.
+
+    Args:
+        of: What was found.
+        said: Notes of the diagnosis.
+        motion: The proof in motion.
+    """
+    robot, ex, proof = of.data.robot, of.ex, of.proof
+    return rounded(views.Views(
+        robot.joint_names, tuple(of.data.names), views.maps(robot, ex, proof),
+        views.motions(robot, ex, proof, of.data.names), views.ranking(robot, ex), views.spectra(robot, ex, proof),
+        link_shifts(robot, ex), said, motion,
+    ))  # fmt: skip
+
+
+def fit_by_joint(robot: Robot, proof: HeldOut, scatter: np.ndarray) -> dict[str, Fit]:
+    """Errors on unseen data and what the sensors scatter by; none where a joint was not judged."""
+    columns = (*(proof.rmse(x) for x in (proof.nominal, proof.refit, proof.corrected)), scatter)
+    return {
+        name: Fit(*(float(column[j]) for column in columns)) if proof.judged[j] else Fit()
+        for j, name in enumerate(robot.joint_names)
+    }
+
+
+def _unexplained(robot: Robot, s: Structure) -> Unexplained:
+    name, unit = robot.joint_names[s.joint], "N" if robot.is_slide[s.joint] else "N m"
+    where = f"{name}: {s.rms:.3g} {unit} RMS that no effect explains; it depends on {s.variable}"
+    return Unexplained((name,), where, s.share, s.p_value)
+
+
+def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
+    """All notes, what matters most first; `torque` is the size of the joints' torque, shape (n,)."""
+    robot, judged = of.data.robot, of.proof.judged
+    gap = None if of.beyond is None else native_gap(of.beyond, of.data.band)
+    lacking = list(dict.fromkeys(n.effect.title for n in of.model.named if n.effect.export.not_in_mjcf))
+    open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
+    return [
+        *of.data.servo_notes, *harmful_notes(robot, of.harmful), *open_joints,
+        *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names),
+        *discrepancy_notes(robot, of.proof), *command_notes(of.ex, of.data.servo),
+        *coarse_positions(robot, *of.sensors, judged), *of.data.notes, *notes(of.data, of.uncertainty, judged),
+        *gap_notes(robot, gap, torque, lacking),
+    ]  # fmt: skip
