@@ -16,7 +16,7 @@ from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
 
-MOST_ROWS = 20_000  # of a joint, of which every second, third ... is taken beyond: a log of an hour has ten times as many
+MOST_ROWS = 20_000  # of a joint: of more, every second, third ... is taken; a log of an hour has ten times as many
 FEATURES = 60  # random Fourier features a competitor
 WAVES = 50  # along a joint's range, of the competitor that knows position and direction
 SHIFTS = 99  # circular time shifts that make the null
