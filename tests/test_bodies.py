@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy import optimize
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.inertials.bodies import of_bodies
-from irb140_jax.mismatch.inertials.consistent import LEAST, pseudo_inertia
+from irb140_jax.mismatch.inertials.consistent import pseudo_inertia
 from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.robot import Robot, irb140
 
@@ -45,7 +46,7 @@ def test_what_is_impossible_becomes_the_most_probable_body(seed):
     _, phi, factor = arm()
     assert least(mean) < 0.0
     moved = of_bodies(mean, cov, np.eye(len(mean)), phi, factor)
-    assert least(moved) >= LEAST * (1.0 - 1e-5)
+    assert least(moved) >= settings.LEAST_MASS * (1.0 - 1e-5)
     precision = np.linalg.inv(cov)
     off = lambda x: float((x - mean) @ precision @ (x - mean))  # noqa: E731
     # From it, no direction that keeps bodies possible is more probable: a search without slopes finds none.
@@ -57,7 +58,7 @@ def test_what_is_impossible_becomes_the_most_probable_body(seed):
             lambda a, trial=trial: off(moved + a * (trial - moved)), bounds=(0.0, 1.0), method="bounded"
         )
         point = moved + line.x * (trial - moved)
-        assert least(point) < LEAST or off(point) > best * (1.0 - 1e-3)
+        assert least(point) < settings.LEAST_MASS or off(point) > best * (1.0 - 1e-3)
 
 
 def test_possible_bodies_stay_as_they_are():

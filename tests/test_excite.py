@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from irb140_jax import cli
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import diagnose, load_undecided, propose, save
+from irb140_jax.mismatch import settings as decisions
 from irb140_jax.mismatch.experiment_design import design
 from irb140_jax.mismatch.experiment_design.questions import Questions
 from irb140_jax.mismatch.experiment_design.undecided import Pair, save_undecided
-from irb140_jax.mismatch.validation.testable import VISIBLE
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot, record_again
 from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import fourier_motion, motion_limits, slow_motion, within
@@ -128,8 +128,8 @@ def test_what_another_joints_motion_cannot_show_is_not_testable():
 def test_the_proposed_motion_makes_the_hidden_effect_visible():
     open_, designed = slow_case()[1].undecided, proposal()
     at = [k for k, c in enumerate(open_.hidden) if open_.columns[c].slug == "load_dependent_friction"]
-    assert at and all(designed.seen_now[k] < VISIBLE for k in at)
-    assert max(designed.seen[k] for k in at) > VISIBLE
+    assert at and all(designed.seen_now[k] < decisions.VISIBLE for k in at)
+    assert max(designed.seen[k] for k in at) > decisions.VISIBLE
 
 
 def test_recording_the_proposed_motion_names_what_was_hidden():

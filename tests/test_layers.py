@@ -28,7 +28,7 @@ LAYERS = (
 )
 # Inside mismatch/: the stages of a diagnosis, in their order.
 STAGES = (
-    "records", "result", "inertials", "columns", "regression", "selection", "corrected", "validation",
+    "settings", "records", "result", "inertials", "columns", "regression", "selection", "corrected", "validation",
     "experiment_design", "motion", "output", "diagnose",
 )  # fmt: skip
 LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}

@@ -79,7 +79,7 @@ def test_the_discrepancy_is_carried_only_where_unseen_data_are_better_for_it(ali
 
 
 def test_the_noise_that_a_set_leaves_is_what_the_true_laws_leave(alike):
-    left = noise_left(alike.data, alike.extra, alike.space, alike.chosen, alike.settings)
+    left = noise_left(alike.data, alike.extra, alike.space, alike.chosen, alike.hyper)
     smooth, band, _ = recorded(0.9, 0.9, 0.9)
     # Noise of torque and encoders, and the reversals that those hide from a band of 4 Hz.
     both = zip(alike.data.stretches, smooth, strict=True)

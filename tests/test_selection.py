@@ -7,8 +7,9 @@ import pytest
 from scipy import integrate, signal, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
-from irb140_jax.mismatch.regression.gram import LEVELS, ONE, SIZES, JointGram, log_prior, own_scale
+from irb140_jax.mismatch.regression.gram import LEVELS, ONE, JointGram, log_prior, own_scale
 from irb140_jax.mismatch.regression.noise import correlation_time
 from irb140_jax.mismatch.selection.averages import probabilities
 from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Space
@@ -55,7 +56,7 @@ def planted(seed: int, amplitudes: dict[int, float]) -> tuple[Space, list[dict[s
 
 
 def density(
-    space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], settings, width: float
+    space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], hyper, width: float
 ) -> float:
     """Log density of both joints' torque with every unknown integrated out by its covariance: no Gram matrices.
 
@@ -63,13 +64,13 @@ def density(
     """
     columns = space.set_columns(chosen)
     shared, blocks = [], []
-    for d, setting in zip(data, settings, strict=True):
+    for d, of_joint in zip(data, hyper, strict=True):
         wide = np.zeros((ROWS, space.size))
         wide[:, d["mine"]] = d["X"]
         wide[:, :INERTIALS] *= width
         shared.append(wide[:, columns])
-        E = d["E"] * own_scale(GROUPS, setting)
-        blocks.append(E @ E.T + LEVELS[setting[-1]] ** 2 * np.eye(ROWS))
+        E = d["E"] * own_scale(GROUPS, of_joint)
+        blocks.append(E @ E.T + LEVELS[of_joint[-1]] ** 2 * np.eye(ROWS))
     Z = np.concatenate(shared)
     cov = Z @ Z.T
     cov[:ROWS, :ROWS] += blocks[0]
@@ -82,20 +83,20 @@ def density(
 @pytest.mark.parametrize("chosen", [(), (0,), (1, 6), (0, 3, 5)])
 def test_the_evidence_of_a_set_is_the_density_of_the_data(chosen):
     space, data = planted(1, {0: 1.0, 5: 0.5})
-    settings = (SETTING, (0, 2, 5, ONE))
-    widths = [density(space, data, chosen, settings, w) for w in WIDTHS] + LOG_PRIOR
-    expected = np.logaddexp.reduce(widths) + sum(map(log_prior, settings)) + len(chosen) * np.log(0.05)
-    assert space.log_evidence(chosen, settings) == pytest.approx(expected, abs=1e-8)
-    assert space.width(chosen, settings) == WIDTHS[np.argmax(widths)]
+    hyper = (SETTING, (0, 2, 5, ONE))
+    widths = [density(space, data, chosen, hyper, w) for w in WIDTHS] + LOG_PRIOR
+    expected = np.logaddexp.reduce(widths) + sum(map(log_prior, hyper)) + len(chosen) * np.log(0.05)
+    assert space.log_evidence(chosen, hyper) == pytest.approx(expected, abs=1e-8)
+    assert space.width(chosen, hyper) == WIDTHS[np.argmax(widths)]
 
 
 def test_screening_says_what_the_evidence_says_at_the_width_of_the_inertials_of_the_set_before():
     space, data = planted(2, {2: 1.0})
-    settings, which = (SETTING, SETTING), np.array([0, 1, 3, 5])
-    width = space.width((2,), settings)
-    before = density(space, data, (2,), settings, width)
-    expected = [density(space, data, (2, int(i)), settings, width) - before + np.log(0.05) for i in which]
-    np.testing.assert_allclose(space.gains((2,), settings, which), expected, atol=1e-8)
+    hyper, which = (SETTING, SETTING), np.array([0, 1, 3, 5])
+    width = space.width((2,), hyper)
+    before = density(space, data, (2,), hyper, width)
+    expected = [density(space, data, (2, int(i)), hyper, width) - before + np.log(0.05) for i in which]
+    np.testing.assert_allclose(space.gains((2,), hyper, which), expected, atol=1e-8)
 
 
 def test_the_prior_of_the_widths_is_a_probability():
@@ -126,15 +127,15 @@ def test_sites_of_a_kind_have_it_as_often_as_a_share_of_sites_that_is_the_robots
 
 def test_the_posterior_is_that_of_the_data():
     space, data = planted(3, {1: 1.0})
-    settings, chosen = (SETTING, (2, 0, 0, ONE + 3)), (1, 4)
-    mean, cov = space.posterior(chosen, settings)
-    width = np.where(np.arange(INERTIALS + COMMON + 2) < INERTIALS, space.width(chosen, settings), 1.0)
+    hyper, chosen = (SETTING, (2, 0, 0, ONE + 3)), (1, 4)
+    mean, cov = space.posterior(chosen, hyper)
+    width = np.where(np.arange(INERTIALS + COMMON + 2) < INERTIALS, space.width(chosen, hyper), 1.0)
     columns, precision, moment = space.set_columns(chosen), np.diag(1.0 / width**2), 0.0
-    for d, setting in zip(data, settings, strict=True):
+    for d, of_joint in zip(data, hyper, strict=True):
         wide = np.zeros((ROWS, space.size))
         wide[:, d["mine"]] = d["X"]
-        E = d["E"] * own_scale(GROUPS, setting)
-        inverse = np.linalg.inv(E @ E.T + LEVELS[setting[-1]] ** 2 * np.eye(ROWS))
+        E = d["E"] * own_scale(GROUPS, of_joint)
+        inverse = np.linalg.inv(E @ E.T + LEVELS[of_joint[-1]] ** 2 * np.eye(ROWS))
         precision = precision + wide[:, columns].T @ inverse @ wide[:, columns]
         moment = moment + wide[:, columns].T @ inverse @ d["y"]
     np.testing.assert_allclose(cov, np.linalg.inv(precision), atol=1e-10)
@@ -143,16 +144,16 @@ def test_the_posterior_is_that_of_the_data():
 
 def test_settings_that_are_settled_have_no_better_neighbour_one_step_away():
     space, _ = planted(4, {0: 2.0})
-    value, settings = space.settled((0,), (SETTING, SETTING))
-    assert value == pytest.approx(space.log_evidence((0,), settings))
+    value, hyper = space.settled((0,), (SETTING, SETTING))
+    assert value == pytest.approx(space.log_evidence((0,), hyper))
     for j in range(2):
         for axis in range(len(SETTING)):
             for step in (-1, 1):
-                trial = list(settings[j])
+                trial = list(hyper[j])
                 trial[axis] += step
-                low, high = (ONE, len(LEVELS)) if axis == len(SETTING) - 1 else (0, len(SIZES))
+                low, high = (ONE, len(LEVELS)) if axis == len(SETTING) - 1 else (0, len(settings.DISCREPANCY_SIZES))
                 if low <= trial[axis] < high:
-                    other = tuple(tuple(trial) if i == j else s for i, s in enumerate(settings))
+                    other = tuple(tuple(trial) if i == j else s for i, s in enumerate(hyper))
                     assert space.log_evidence((0,), other) <= value + 2e-3
 
 
@@ -185,15 +186,16 @@ def test_without_a_member_that_held_another_ones_shape_in_place_that_one_takes_a
         candidates[k] = dataclasses.replace(candidates[4], shape=np.array([float(k)]), columns=np.array([k]))
     lowest[4] = 10.0
     space = dataclasses.replace(space, candidates=tuple(candidates), lowest=lowest)
-    settings = (SETTING, SETTING)
-    assert space.log_evidence((0, 4), settings) == -np.inf
-    assert space.reshaped((0, 4), settings) == (0, 5) and space.reshaped((0, 5), settings) == (0, 5)
-    assert 4 not in Search(space, settings).run((0, 4))
+    hyper = (SETTING, SETTING)
+    assert space.log_evidence((0, 4), hyper) == -np.inf
+    assert space.reshaped((0, 4), hyper) == (0, 5) and space.reshaped((0, 5), hyper) == (0, 5)
+    assert 4 not in Search(space, hyper).run((0, 4))
 
 
 def test_the_prior_of_the_sizes_is_a_probability():
-    total = sum(np.exp(log_prior((k, 0, 0, ONE)) - log_prior((0, 0, 0, ONE))) for k in range(len(SIZES)))
-    first = 2.0 / np.pi * np.arctan(0.5 * SIZES[1] / 0.03)
+    every = range(len(settings.DISCREPANCY_SIZES))
+    total = sum(np.exp(log_prior((k, 0, 0, ONE)) - log_prior((0, 0, 0, ONE))) for k in every)
+    first = 2.0 / np.pi * np.arctan(0.5 * settings.DISCREPANCY_SIZES[1] / 0.03)
     assert total * first == pytest.approx(1.0)
 
 
@@ -227,17 +229,17 @@ def test_a_sets_shapes_are_summed_over_one_member_at_a_time():
         for k in points:
             candidates[k] = dataclasses.replace(candidates[first], shape=np.array([float(k)]), columns=np.array([k]))
     space = dataclasses.replace(space, candidates=tuple(candidates))
-    settings, chosen = (SETTING, SETTING), (0, 1, 6)
+    hyper, chosen = (SETTING, SETTING), (0, 1, 6)
     expected = 0.0
     for member, points in ((1, shapes[1]), (6, shapes[5])):
         rest = tuple(c for c in chosen if c != member)
         sets = [tuple(sorted((*rest, k))) for k in points]
-        width = space.width(rest, settings)
-        values = [density(space, data, s, settings, width) for s in (*sets, chosen)]
+        width = space.width(rest, hyper)
+        values = [density(space, data, s, hyper, width) for s in (*sets, chosen)]
         expected += np.logaddexp.reduce(values[:-1]) - values[-1]
     assert expected > 0.0
-    assert space.over_shapes(chosen, settings) == pytest.approx(expected, abs=1e-8)
-    assert space.over_shapes((0,), settings) == 0.0
+    assert space.over_shapes(chosen, hyper) == pytest.approx(expected, abs=1e-8)
+    assert space.over_shapes((0,), hyper) == 0.0
 
 
 def test_blocks_left_out_are_as_if_they_had_not_been_recorded():

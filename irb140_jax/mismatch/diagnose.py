@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.corrected.fitted import discrepancy_carried, fitted_model
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file
@@ -26,7 +27,6 @@ from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
 from irb140_jax.mismatch.regression.sufficient_data import Comparison, comparison, too_little
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
-from irb140_jax.mismatch.selection.selected import NAMED
 from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted
 from irb140_jax.mismatch.validation.testable import reference, visibility
 from irb140_jax.mismatch.validation.unexplained import unexplained
@@ -136,7 +136,7 @@ def _explained(
     scatter, uncertainty = np.hypot(*sensors), config.inertial_uncertainty
     ex = explain(data.robot, data.smooth, data.band, config.effects, uncertainty, scatter, progress)
     ex = without_negligible(ex, data.servo)
-    return dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= NAMED)
+    return dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= settings.NAMED)
 
 
 def _corrected(

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from irb140_jax.effects.base import separating_motion
-from irb140_jax.mismatch import Proposal, Undecided
-from irb140_jax.mismatch.validation.testable import VISIBLE
+from irb140_jax.mismatch import Proposal, Undecided, settings
 from irb140_jax.robot import Robot
 
 SEPARATED = np.log(20.0)  # log odds at which one of two explanations has won
@@ -69,7 +68,7 @@ def _hidden(robot: Robot, open_: Undecided, proposal: Proposal) -> Iterator[str]
         column = open_.columns[c]
         joints = "all joints" if column.effect.place.everywhere and len(column.joints) == robot.n else _listed(
             [robot.joint_names[j] for j in column.joints])
-        shown[z >= VISIBLE].setdefault(column.effect.title, []).append(joints)
+        shown[z >= settings.VISIBLE].setdefault(column.effect.title, []).append(joints)
     if shown[True]:
         yield f"This motion shows what the recordings could not have shown: {_titles(shown[True])}."
     if shown[False]:

@@ -7,9 +7,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from irb140_jax.errors import InputError
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.experiment_design.questions import Questions
 from irb140_jax.mismatch.experiment_design.undecided import Undecided
-from irb140_jax.mismatch.validation.testable import VISIBLE
 from irb140_jax.recordings.excite import Excitation, within
 from irb140_jax.recordings.segments import KINDS, Segment, joined, segment_motion
 from irb140_jax.robot import Robot
@@ -18,11 +18,8 @@ PIECE = 8.0  # [s] a piece of motion lasts: a ladder of four speeds, or some str
 POOL = 36  # pieces drawn at first
 ROUNDS, NEAR = 2, 8  # rounds of refinement, and pieces drawn near the chosen ones in each
 MOST_COMPARISONS = 10_000  # some milliseconds each; counted, not timed, so that the same seed gives the same motion
-HIDDEN_WEIGHT = 0.3  # worth of making one effect testable, beside doubling the odds of a pair
-SPEED_UP = 2.0  # times the speed seen in the recordings: what a robot without speed limits is asked for at most
 LONGEST = 600.0  # [s] that a motion may last; more pieces than are drawn would repeat themselves
 LEAST_RATE, MOST_ROWS = 20.0, 10**6  # [1/s]; a million rows are a table of hundreds of megabytes
-EFFORT_SHARE = 0.8  # of the torque limits that the nominal model may need; what is left out needs some, too
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +80,7 @@ def propose(
 def _proposed(
     robot: Robot, open_: Undecided, seed: int, count: int, rate: float, progress: Callable[[str], None]
 ) -> Proposal:
-    bounded = within(robot, open_.scales.low, open_.scales.high, SPEED_UP * open_.scales.speed)
+    bounded = within(robot, open_.scales.low, open_.scales.high, settings.SPEED_UP * open_.scales.speed)
     search = _Search(bounded, Questions(robot, open_), np.random.default_rng([seed, 60]))
     for k in range(4):
         progress(f"drawing pieces of motion ({k + 1} of 4)")
@@ -143,7 +140,7 @@ class _Search:
 
     def _add(self, segment: Segment) -> None:
         motion = segment_motion(self.robot, segment, PIECE, self.questions.open.band.rate)
-        gram = self.questions.gram(motion, EFFORT_SHARE)
+        gram = self.questions.gram(motion, settings.EFFORT_SHARE)
         self.tried += 1
         self.too_strong += gram is None
         if gram is not None:
@@ -158,8 +155,8 @@ class _Search:
             z = self.questions.visible(G, range(len(o.columns)))
             return float(np.mean(np.log(z + 0.1))) if len(z) else 0.0
         decided = sum(np.arcsinh(self.questions.margin(G, p)) for p in o.pairs)
-        shown = np.sum(np.minimum(self.questions.visible(G, o.hidden) / VISIBLE, 1.0))
-        return float(decided + HIDDEN_WEIGHT * shown)
+        shown = np.sum(np.minimum(self.questions.visible(G, o.hidden) / settings.VISIBLE, 1.0))
+        return float(decided + settings.HIDDEN_WEIGHT * shown)
 
     def grown(self, count: int) -> list[int]:
         """The best piece, then the best beside it, and so on."""

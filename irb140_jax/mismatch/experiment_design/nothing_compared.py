@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.effects import Effect
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import prepared, scales_of
 from irb140_jax.mismatch.columns.candidates import Candidate, library
-from irb140_jax.mismatch.experiment_design.undecided import UNKNOWN_NOISE, Column, Undecided
+from irb140_jax.mismatch.experiment_design.undecided import Column, Undecided
 from irb140_jax.mismatch.regression.noise import ORDER
-from irb140_jax.mismatch.validation.testable import REFERENCE_SHARE, Seen, Site, reference
+from irb140_jax.mismatch.validation.testable import Seen, Site, reference
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
@@ -41,11 +42,12 @@ def all_open(
     columns = tuple(Column(c.effect, c.joints, tuple(map(float, c.shape)), c.variant) for c in middle)
     amplitudes = np.concatenate([c.columns for c in middle])
     typical = np.concatenate([np.full(len(c.columns), c.effect.prior.typical) for c in middle])
-    scale = typical / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
+    scale = typical / settings.REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
     size = 10 * robot.n + len(amplitudes) + 1
     white = np.tile(np.eye(1, ORDER + 1), (robot.n, 1))
     questions = Undecided(
         columns, (), (), (), tuple(range(len(columns))), np.zeros((size, size)), scale,
-        matters.in_prior_units(amplitudes, scale), uncertainty, white, UNKNOWN_NOISE * matters.torque, band, scales,
+        matters.in_prior_units(amplitudes, scale), uncertainty, white, settings.UNKNOWN_NOISE * matters.torque, band,
+        scales,
     )  # fmt: skip
     return questions, {site: (0.0, k) for k, site in enumerate(shapes)}

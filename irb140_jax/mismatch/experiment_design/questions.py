@@ -5,13 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import prepared
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.mismatch.experiment_design.undecided import Pair, Sets, Undecided
 from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
-from irb140_jax.mismatch.regression.assemble import LOOSE_STD
 from irb140_jax.mismatch.regression.gaussian import eliminated, gain_of, grams, posterior
-from irb140_jax.mismatch.regression.gram import USUAL
 from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.regression.rows import stretch
 from irb140_jax.mismatch.validation.testable import played, stands_out
@@ -51,7 +50,7 @@ class Questions:
         loose = [inertials[10 * k : 10 * k + 10] for k in o.loose]
         columns = np.concatenate([inertials, *loose, len(inertials) + self._order])
         scale = np.concatenate(
-            [np.full(len(self._factor), o.uncertainty), np.full(10 * len(o.loose), LOOSE_STD), o.scale]
+            [np.full(len(self._factor), o.uncertainty), np.full(10 * len(o.loose), settings.LOOSE_INERTIALS), o.scale]
         )
         noise = Noise(o.ar, o.level[None], o.level[None], np.ones(len(o.ar)))
         return grams([rows], columns, noise, scale, 1)[0, :-1, :-1]
@@ -61,8 +60,8 @@ class Questions:
 
         The log that either predicts is added to the recordings there are; the other does with it what it can, with
         inertials, amplitudes and shapes free: half the divergence that T-optimal designs maximise.  What laws
-        are usually wrong by (`USUAL`) is taken off, so that the motion convinces all the same; below zero, they stay
-        even.
+        are usually wrong by (`USUAL_MISFIT`) is taken off, so that the motion convinces all the same; below zero, they
+        stay even.
 
         Args:
             added: What the motion adds, from `gram`.
@@ -105,7 +104,7 @@ class Questions:
         mean = posterior(left, o.best).mean
         explained = 0.0 if exact else 0.5 * float(mean @ H[np.ix_(o.best, o.best)] @ mean)
         gain = lambda sets: max(gain_of(left, s) for s in sets)  # noqa: E731
-        return gain(o.truths) - gain(o.others) - USUAL**2 * explained
+        return gain(o.truths) - gain(o.others) - settings.USUAL_MISFIT**2 * explained
 
     def visible(self, added: np.ndarray, columns: Sequence[int]) -> np.ndarray:
         """Standard deviations by which effects, at the strength of `testable`, would stand out; one for each column."""

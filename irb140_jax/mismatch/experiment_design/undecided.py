@@ -10,16 +10,16 @@ import numpy as np
 
 from irb140_jax.effects import Effect, Scales
 from irb140_jax.effects.catalogue import known
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gaussian import eliminated
 from irb140_jax.mismatch.regression.gram import LEVELS
 from irb140_jax.mismatch.result import Finding
 from irb140_jax.mismatch.selection.explanation import Explanation
-from irb140_jax.mismatch.validation.testable import REFERENCE_SHARE, VISIBLE, Reference, Seen
+from irb140_jax.mismatch.validation.testable import Reference, Seen
 from irb140_jax.recordings.low_pass import Band
 
 FILE, SCHEMA = "undecided.npz", 1
-UNKNOWN_NOISE = 0.01  # of a joint's torque on a lively motion: what current sensors of arms have
 Sets = tuple[tuple[int, ...], ...]
 
 
@@ -136,14 +136,14 @@ def undecided(
         for site, named, slug, p, at, rival in pairs
     )
     chosen = table.of(physics)
-    hidden = table.of(i for z, i in seen.values() if z < VISIBLE)
+    hidden = table.of(i for z, i in seen.values() if z < settings.VISIBLE)
     table.of(i for _, i in seen.values())
     links = tuple(j for c in loose for j in ex.data.candidates[c].joints)
     gram, scale, strength = table.gram(ex, loose, matters)
     # A joint that never moved told nothing of its noise.
     still = np.array([g.rows.sum() == 0 for g in ex.space.joints])
-    times = [LEVELS[s[-1]] for s in ex.settings]
-    level = np.where(still, UNKNOWN_NOISE * matters.torque, np.median(ex.noise.level, axis=0) * times)
+    times = [LEVELS[s[-1]] for s in ex.hyper]
+    level = np.where(still, settings.UNKNOWN_NOISE * matters.torque, np.median(ex.noise.level, axis=0) * times)
     return Undecided(
         tuple(table.columns), chosen, links, made, hidden, gram, scale, strength, uncertainty, ex.noise.ar, level,
         band, ex.scales,
@@ -185,13 +185,13 @@ class _Table:
             [np.arange(space.offset), *(space.columns[c] for c in loose), space.offset + amplitudes]
         ))  # fmt: skip
         instrument = np.arange(nuisances, space.offset)
-        H, _ = eliminated(space.gram(ex.settings, index, index), instrument)
+        H, _ = eliminated(space.gram(ex.hyper, index, index), instrument)
         H = np.delete(np.delete(H, instrument, axis=0), instrument, axis=1)
         # What these recordings don't excite has no prior scale of theirs: that of lively motion stands in.
         typical = np.concatenate([np.zeros(0), *(
             np.full(len(self._candidates[i].columns), self._candidates[i].effect.prior.typical) for i in self._numbers
         )])  # fmt: skip
-        likely = typical / REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
+        likely = typical / settings.REFERENCE_SHARE * np.abs(matters.amplitudes[amplitudes])
         scale = ex.data.scale[nuisances + amplitudes]
         scale = np.where(matters.in_prior_units(amplitudes, scale) == 0.0, likely, scale)
         return H, scale, matters.in_prior_units(amplitudes, scale)

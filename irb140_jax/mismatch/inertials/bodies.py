@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 from scipy import linalg, optimize
 
-from irb140_jax.mismatch.inertials.consistent import LEAST, parameters, pseudo_inertia
+from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.inertials.consistent import parameters, pseudo_inertia
 
 TRIALS = 300  # evaluations of the search; thirty are usual, and more where many bounds are met
 
@@ -15,8 +16,8 @@ def of_bodies(
 ) -> np.ndarray:
     """The mean of a Gaussian moved to the most probable inertials that bodies can have.
 
-    Each link's pseudo-inertia is kept at or above `LEAST` times its nominal one; a link without nominal mass is left
-    alone.  All else moves along as it is correlated with the inertials.
+    Each link's pseudo-inertia is kept at or above `LEAST_MASS` times its nominal one; a link without nominal mass is
+    left alone.  All else moves along as it is correlated with the inertials.
 
     Args:
         mean, cov: Of K unknowns, shape (K,) and (K, K).
@@ -43,7 +44,7 @@ def of_bodies(
     off = lambda x: np.concatenate([link.errors(v) for link, v in each(x)]) - errors[rows]  # noqa: E731
     slope = lambda x: whiten @ linalg.block_diag(*(link.slopes(v) for link, v in each(x)))  # noqa: E731
     # From the nominal bodies: from the bounds of the impossible mean the search may stay far from the best.
-    start = np.tile(np.sqrt(1.0 - LEAST) * np.eye(4)[LOWER], len(free))
+    start = np.tile(np.sqrt(1.0 - settings.LEAST_MASS) * np.eye(4)[LOWER], len(free))
     best = optimize.least_squares(
         lambda x: whiten @ off(x), start, slope, method="lm", max_nfev=TRIALS  # pyright: ignore[reportArgumentType]
     ).x
@@ -52,7 +53,7 @@ def of_bodies(
 
 @dataclasses.dataclass(frozen=True)
 class _Link:
-    """A link's pseudo-inertia as its least one and a square, J = LEAST J_nominal + L (U U') L', J_nominal = L L'.
+    """A link's pseudo-inertia as its least one and a square, J = LEAST_MASS J_nominal + L (U U') L', J_nominal = L L'.
 
     Attributes:
         rows: Of its inertials among all.
@@ -81,12 +82,12 @@ class _Link:
         return linalg.solve_triangular(self.root, linalg.solve_triangular(self.root, J, lower=True).T, lower=True)
 
     def impossible(self, errors: np.ndarray) -> bool:
-        return bool(np.linalg.eigvalsh(self._relative(errors))[0] < LEAST * (1.0 - 1e-6))
+        return bool(np.linalg.eigvalsh(self._relative(errors))[0] < settings.LEAST_MASS * (1.0 - 1e-6))
 
     def errors(self, x: np.ndarray) -> np.ndarray:
         U = np.zeros((4, 4))
         U[LOWER] = x
-        J = self.root @ (LEAST * np.eye(4) + U @ U.T) @ self.root.T
+        J = self.root @ (settings.LEAST_MASS * np.eye(4) + U @ U.T) @ self.root.T
         return self.inverse @ (parameters(J) - self.phi)
 
     def slopes(self, x: np.ndarray) -> np.ndarray:

@@ -2,15 +2,16 @@
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
+
 ROUNDING = 1e-9  # of a pseudo-inertia's largest eigenvalue
-LEAST = 1e-3  # of the nominal mass, along any of its directions: a link thinner than that is rounding
 
 
 def consistent(phi: np.ndarray, nominal: np.ndarray) -> np.ndarray:
     """The parameters, with mass taken from where a fit made it negative to where there is none.
 
     Each link's pseudo-inertia is written in axes in which the nominal one is the unit matrix; eigenvalues below
-    `LEAST` are raised to it.  What is possible already stays as it is; a link without nominal mass keeps none.
+    `LEAST_MASS` are raised to it.  What is possible already stays as it is; a link without nominal mass keeps none.
 
     Args:
         phi: Inertial parameters, shape (n, 10).
@@ -28,9 +29,9 @@ def consistent(phi: np.ndarray, nominal: np.ndarray) -> np.ndarray:
             continue
         inverse = np.linalg.inv(L)
         values, vectors = np.linalg.eigh(inverse @ pseudo_inertia(new) @ inverse.T)
-        if values.min() < LEAST:
+        if values.min() < settings.LEAST_MASS:
             root = L @ vectors
-            out[i] = parameters(root @ np.diag(np.maximum(values, LEAST)) @ root.T)
+            out[i] = parameters(root @ np.diag(np.maximum(values, settings.LEAST_MASS)) @ root.T)
     return out
 
 

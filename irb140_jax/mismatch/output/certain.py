@@ -2,11 +2,10 @@
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.robot import Robot
 
-LEAST_POWER = 0.05  # of the finding's: joints with less of it are not listed
-SLOW = 0.1  # of a joint's highest speed: slower rows are left out of the means by direction
 LEVELS = ("torque_offset",)  # effects beside friction that are a level of torque while the joint moves
 
 
@@ -33,7 +32,7 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
     rows = np.maximum(sum(u.sum(axis=0) for u in use), 1)
     logged = np.sqrt(sum(np.sum(np.where(s.use, s.tau, 0.0) ** 2, axis=0) for s in ex.data.stretches) / rows)
     rms = np.sqrt(power / rows)
-    listed = [j for j in np.argsort(-power) if power[j] > LEAST_POWER * power.sum()]
+    listed = [j for j in np.argsort(-power) if power[j] > settings.LISTED_POWER * power.sum()]
     sizes = [
         f"{rms[j]:.3g} {_unit(robot, j)} RMS on {robot.joint_names[j]} ({_percent(rms[j] / max(logged[j], 1e-300))} of "
         "its logged torque)"
@@ -50,7 +49,7 @@ def _mean_by_direction(
     robot: Robot, ex: Explanation, j: int, columns: np.ndarray, w: np.ndarray, cov: np.ndarray
 ) -> str:
     """Mean torque of the finding in either direction of motion, in words; empty if a direction has no rows."""
-    fast = [np.abs(s.qd[:, j]) > SLOW * np.max(np.abs(s.qd[:, j]), initial=0.0) for s in ex.data.stretches]
+    fast = [np.abs(s.qd[:, j]) > settings.SLOW * np.max(np.abs(s.qd[:, j]), initial=0.0) for s in ex.data.stretches]
     said = []
     for sign in (1.0, -1.0):
         moving = [

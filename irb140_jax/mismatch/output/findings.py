@@ -5,16 +5,13 @@ from scipy import special
 
 from irb140_jax.effects import Effect
 from irb140_jax.effects.base import separating_motion
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.output.certain import certain
 from irb140_jax.mismatch.result import Alternative, Estimate, Evidence, Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
-from irb140_jax.mismatch.selection.selected import NAMED
-from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.mismatch.validation.held_out import held_out_gains
 from irb140_jax.mismatch.validation.intervals import parameters_of
 from irb140_jax.robot import Robot
-
-LEAST_PROBABILITY = 0.02  # of an alternative that is listed
 
 
 def findings(robot: Robot, ex: Explanation) -> list[Finding]:
@@ -44,7 +41,7 @@ def torque_scale_odds(ex: Explanation) -> tuple[float, float]:
 
     A nuisance parameter with a stated prior; the prior odds are those of any rare effect.
     """
-    odds = ex.space.torque_scale_odds(ex.chosen, ex.settings) + np.log(RARE)
+    odds = ex.space.torque_scale_odds(ex.chosen, ex.hyper) + np.log(settings.RARE)
     return float(odds), float(special.expit(odds))
 
 
@@ -84,11 +81,11 @@ def _alternatives(ex: Explanation, index: int) -> tuple[Alternative, ...]:
     c, effects = ex.data.candidates[index], ex.lib.effects
     best: dict[str, float] = {}
     for (slug, _), p in ex.rivals(index).items():
-        if slug in effects and slug != c.slug and p > LEAST_PROBABILITY:
+        if slug in effects and slug != c.slug and p > settings.LISTED_PROBABILITY:
             best[slug] = max(best.get(slug, 0.0), p)
     parts = {slug: p for slug, p in best.items() if slug in c.effect.law.contains}
     others = {slug: p for slug, p in best.items() if slug not in parts}
-    alone = {slug: p for slug, p in parts.items() if NAMED * p > sum(others.values())}
+    alone = {slug: p for slug, p in parts.items() if settings.NAMED * p > sum(others.values())}
     stays = [effects[slug] for slug in parts if slug not in alone]
     return tuple(
         Alternative(slug, p, _separation(c.effect, effects[slug], [e for e in stays if e.slug != slug]))

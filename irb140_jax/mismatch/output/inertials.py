@@ -4,11 +4,10 @@ import dataclasses
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.inertials.consistent import consistent
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.robot import Robot
-
-NOTABLE_SHIFT = 3.0  # standard deviations by which a link's inertials must change to be worth a sentence
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +54,7 @@ def link_shifts(robot: Robot, ex: Explanation) -> tuple[LinkShift, ...]:
                 f"uncertainty of {100 * uncertainty:.3g} %: refitting them changes the torque of "
                 f"{_torque_change(robot, ex, dphi, k)}."
             )
-        elif shift > NOTABLE_SHIFT:
+        elif shift > settings.NOTABLE_SHIFT:
             sentence = (
                 f"Refitting changes the inertial parameters of the link behind {name} by {shift:.1f} standard "
                 "deviations of their stated uncertainty."

@@ -4,15 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.nuisances import SCALED
 from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.selection.explanation import Explanation
-from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.robot import Robot
 
 FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
-NOTABLE_GAP = 0.03  # of a joint's torque, by which corrected.xml may differ and nothing is said
 
 
 def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]:
@@ -45,7 +44,7 @@ def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]
 
 def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
     """A note where the inertials look wrong by clearly more than was stated."""
-    width = ex.space.width(ex.chosen, ex.settings)
+    width = ex.space.width(ex.chosen, ex.hyper)
     if width <= 1.0:
         return []
     return [
@@ -72,7 +71,7 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
         f"{'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of the joint's torque): {reason}. To predict torque, use "
         "`irb140 predict`."
         for name, slide, g, t in zip(robot.joint_names, robot.is_slide, gap, torque, strict=True)
-        if g > NOTABLE_GAP * t > 0.0
+        if g > settings.NOTABLE_GAP * t > 0.0
     ]
 
 
@@ -88,12 +87,12 @@ def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
     """
     out = []
     _, _, own = ex.prediction()
-    for j, setting in enumerate(ex.settings):
-        one_level = (*setting[:FRICTION_LEVELS], 0, *setting[FRICTION_LEVELS + 1 :])
-        alike = (*ex.settings[:j], one_level, *ex.settings[j + 1 :])
-        gain = ex.space.log_evidence(ex.chosen, ex.settings) - ex.space.log_evidence(ex.chosen, alike)
+    for j, of_joint in enumerate(ex.hyper):
+        one_level = (*of_joint[:FRICTION_LEVELS], 0, *of_joint[FRICTION_LEVELS + 1 :])
+        alike = (*ex.hyper[:j], one_level, *ex.hyper[j + 1 :])
+        gain = ex.space.log_evidence(ex.chosen, ex.hyper) - ex.space.log_evidence(ex.chosen, alike)
         levels = ex.extra[0].groups[j] == FRICTION_LEVELS
-        if levels.any() and gain > -np.log(RARE):
+        if levels.any() and gain > -np.log(settings.RARE):
             units = ("N", "N s/m") if ex.lib.robot.is_slide[j] else ("N m", "N m s/rad")
             dry, fast = (own[j] * ex.extra[0].units[j])[levels].reshape(2, -1)
             said = ", ".join(

@@ -6,19 +6,18 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.regression.nuisances import FIXED
 from irb140_jax.mismatch.regression.servo import NAMES
 from irb140_jax.mismatch.result import Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
-from irb140_jax.mismatch.selection.space import RARE
 from irb140_jax.recordings.condition import INEXACT, Commanded, Conditioned
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 
 COMMAND_DELAY = len(FIXED) + NAMES.index("command")
 DRIVE_KD = len(FIXED) + NAMES.index("kd")
-NOTABLE_DELAY = 1e-3  # s, of commands, from which it is worth a note
 LAGS = ("actuator_lag", "time_delay", "channel_skew")  # effects that a late command can't be told from
 
 
@@ -120,8 +119,8 @@ def command_notes(ex: Explanation, servo: Commanded | None) -> list[str]:
     out = []
     for j in range(ex.lib.robot.n):
         own, spread = (x[COMMAND_DELAY] for x in _joint_nuisances(ex, j))
-        odds = stats.norm.logpdf(0.0) - stats.norm.logpdf(0.0, own, spread) + np.log(RARE)
-        if odds > 0.0 and abs(servo.delay_width * own) > NOTABLE_DELAY:
+        odds = stats.norm.logpdf(0.0) - stats.norm.logpdf(0.0, own, spread) + np.log(settings.RARE)
+        if odds > 0.0 and abs(servo.delay_width * own) > settings.NOTABLE_DELAY:
             late, width = 1e3 * servo.delay_width * own, 1e3 * servo.delay_width * spread
             way = "late" if own > 0 else "early"
             out.append(
@@ -134,10 +133,10 @@ def command_notes(ex: Explanation, servo: Commanded | None) -> list[str]:
 
 def _joint_nuisances(ex: Explanation, j: int) -> tuple[np.ndarray, np.ndarray]:
     """A joint's nuisance parameters and their standard deviations, both in prior standard deviations."""
-    mean, _ = ex.space.posterior(ex.chosen, ex.settings)
-    columns, setting = ex.space.set_columns(ex.chosen), ex.settings[j]
-    own = ex.space.own(j, setting, columns, mean, instrument=True)
-    return own, ex.space.joints[j].at(setting).spread()
+    mean, _ = ex.space.posterior(ex.chosen, ex.hyper)
+    columns, of_joint = ex.space.set_columns(ex.chosen), ex.hyper[j]
+    own = ex.space.own(j, of_joint, columns, mean, instrument=True)
+    return own, ex.space.joints[j].at(of_joint).spread()
 
 
 def servo_sentence(recordings: Sequence[Recording]) -> str:

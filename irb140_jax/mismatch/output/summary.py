@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from irb140_jax.effects import Effect
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.output.inertials import LinkShift
 from irb140_jax.mismatch.regression.gaussian import eliminated, gain_of
 from irb140_jax.mismatch.result import Finding, Fit, Verdict
@@ -12,9 +13,6 @@ from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.mismatch.validation.unexplained import Structure
 from irb140_jax.robot import Robot
-
-CLEARLY_BETTER = np.log(100.0)  # log odds that refitted inertials need over the nominal ones
-FEW_LINKS = 2  # of which the summary says by how much their inertials are wrong
 
 
 def verdict(
@@ -46,9 +44,9 @@ def _inertials_matter(ex: Explanation) -> bool:
         return True
     space, instrument = ex.space, np.arange(ex.space.inertials, ex.space.offset)
     every = space.with_y(np.concatenate([instrument, np.arange(space.inertials)]))
-    H = space.gram(ex.settings, every, every)
+    H = space.gram(ex.hyper, every, every)
     left, _ = eliminated(H, np.arange(len(instrument)))
-    return gain_of(left, len(instrument) + np.arange(space.inertials)) > CLEARLY_BETTER
+    return gain_of(left, len(instrument) + np.arange(space.inertials)) > settings.CLEARLY_BETTER
 
 
 def summary(
@@ -92,7 +90,7 @@ def summary(
                 f"{_capital(title)} on {joints} may instead be {rivals}, in whole or in part; these data can't tell."
             )
     changed = [i for i in inertials if i.sentence]
-    if len(changed) > FEW_LINKS:
+    if len(changed) > settings.FEW_LINKS:
         said.append(f"Refitting changes the inertial parameters of the links behind "
                     f"{_listed([i.link for i in changed])} beyond their stated uncertainty.")  # fmt: skip
     else:

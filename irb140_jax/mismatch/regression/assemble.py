@@ -4,14 +4,12 @@ import dataclasses
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
 from irb140_jax.mismatch.columns.loose_inertials import LOOSE_INERTIALS
 from irb140_jax.mismatch.regression.rows import Stretch
 
-LOOSE_STD = 1.0  # relative error of inertials that are wrong beyond their stated uncertainty
-FEWEST_ROWS = 40  # of a joint: any explanation fits fewer, and what is left of them is no measure of noise
 ROUNDING = 1e-9  # of a joint's torque: a column that moves less moves nothing
-BLOCKS = 5  # contiguous blocks per recording: folds where one recording alone tells of a joint or a finding
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,7 +31,7 @@ class Data:
 
 def judged(stretches: list[Stretch]) -> list[Stretch]:
     """The rows, with none of joints of which too few tell."""
-    tells = sum(s.use.sum(axis=0) for s in stretches) >= FEWEST_ROWS
+    tells = sum(s.use.sum(axis=0) for s in stretches) >= settings.FEWEST_ROWS_OF_JOINT
     return [dataclasses.replace(s, use=s.use & tells) for s in stretches]
 
 
@@ -69,7 +67,7 @@ def prior_scale(lib: Library, stretches: list[Stretch], uncertainty: float, powe
         if c.effect.prior.tied:
             moves = typical[c.columns] > 0.0
             typical[c.columns] = np.where(moves, np.min(typical[c.columns], where=moves, initial=np.inf), 0.0)
-    return np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, LOOSE_STD)])
+    return np.concatenate([np.full(nuisances, uncertainty), typical, np.full(nuisances, settings.LOOSE_INERTIALS)])
 
 
 def with_loose_inertials(lib: Library) -> tuple[Candidate, ...]:

@@ -16,11 +16,9 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.effects import Scales
+from irb140_jax.mismatch import settings
 from irb140_jax.recordings.condition import Conditioned
 
-TRAVEL = (2e-4, 8e-4, 3e-3, 1.2e-2)  # of a joint's range: over which bristles turn round
-ROUNDED = (0.003, 0.01, 0.03, 0.1)  # of the top speed: over which friction nears its level, slowly at the end
-LATE = (-0.01, -0.005, 0.005, 0.01, 0.02)  # s by which friction turns before or after the joint
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
 FEATURES = 82  # of all blocks
@@ -84,7 +82,7 @@ def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> list[n
     fast = 1.0 + 2.0 * np.log(np.abs(r.qd[:, j]) / scales.speed[j] + 1e-3) / np.log(1e3)
     speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
     qd, direction = r.qd[:, [j]], r.direction[:, [j]]
-    slow = np.array(ROUNDED) * scales.speed[j]
+    slow = np.array(settings.ROUNDED_SPEEDS) * scales.speed[j]
     rounded, tails = direction - qd / np.hypot(qd, slow), direction - qd / (np.abs(qd) + slow)
     carried = load[:, j] / max(float(scales.torque[j]), 1e-12)
     smooth, reversal = _smooth(r, carried, j, position, speed), _reversal(r, load, carried, scales, j, rounded)
@@ -112,9 +110,9 @@ def _reversal(
     q, qd, qdd, dt = r.q[:, j], r.qd[:, j], r.qdd[:, j], float(np.mean(np.diff(r.t)))
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
-    base = [_relaxed(q, share * travel) - direction for share in TRAVEL]
+    base = [_relaxed(q, share * travel) - direction for share in settings.BRISTLE_TRAVELS]
     rest = float(scales.rest_speed[j])
-    base += [np.tanh((qd + late * qdd) / rest) - direction for late in LATE]
+    base += [np.tanh((qd + late * qdd) / rest) - direction for late in settings.TURNING_DELAYS]
     alone = np.stack(base, axis=1)
     X, even = np.concatenate([alone, rounded], axis=1), np.abs(carried)[:, None]
     pushed = np.abs(qdd)[:, None] / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)

@@ -15,30 +15,30 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.noise import ORDER, Noise, correlation_time
 from irb140_jax.mismatch.regression.nuisances import SCALED, Nuisances
 from irb140_jax.mismatch.regression.rows import Stretch, Window
 
-SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)  # of a block, as a share of the joint's torque
-USUAL = 0.03  # share of the torque that laws are usually wrong by: scale of the half-Cauchy prior
 ONE = 24  # index of the level at which the noise is as it was estimated
 LEVELS = tuple(1.25 ** (k - ONE) for k in range(2 * ONE))  # noise over what was estimated
-REMEMBERED = 192  # settings of a joint that are kept: a quarter of a megabyte each
+REMEMBERED = 192  # hyperparameters of a joint whose factors are kept
 
 CandidateRows = Callable[[int], Iterable[tuple[Window, np.ndarray, np.ndarray]]]  # see `candidate_rows`
-Setting = tuple[int, ...]  # indices into SIZES for each block of SCALED, and into LEVELS
+# Hyperparameters of a joint: indices into DISCREPANCY_SIZES for each block of SCALED, and into LEVELS.
+JointHyper = tuple[int, ...]
 
-START: Setting = (*([3] * len(SCALED)), ONE)
+START: JointHyper = (*([3] * len(SCALED)), ONE)
 
 
-def log_prior(setting: Setting) -> float:
+def log_prior(hyper: JointHyper) -> float:
     """Log prior of the sizes of a joint's discrepancy, half-Cauchy over the grid."""
-    edges = np.sqrt(np.multiply(SIZES[1:-1], SIZES[2:]))
-    edges = np.concatenate([[0.0, SIZES[1] / 2.0], edges, [np.inf]])
-    mass = np.diff(np.arctan(edges / USUAL)) * 2.0 / np.pi
-    return float(np.log(mass[list(setting[:-1])]).sum())
+    edges = np.sqrt(np.multiply(settings.DISCREPANCY_SIZES[1:-1], settings.DISCREPANCY_SIZES[2:]))
+    edges = np.concatenate([[0.0, settings.DISCREPANCY_SIZES[1] / 2.0], edges, [np.inf]])
+    mass = np.diff(np.arctan(edges / settings.USUAL_MISFIT)) * 2.0 / np.pi
+    return float(np.log(mass[list(hyper[:-1])]).sum())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,7 +120,7 @@ class JointGram:
         alike = {int(k): (self.keep & (self.repeats == k)).astype(float) for k in np.unique(self.repeats[self.keep])}
         self._totals = [(k, _sum(blocks, w), float(w @ rows)) for k, w in alike.items()]
         self._once = self._totals[0][1:] if self._totals else (np.zeros(blocks.shape[1:]), 0.0)
-        self._kept: dict[tuple[Setting, bool], Integrated] = {}
+        self._kept: dict[tuple[JointHyper, bool], Integrated] = {}
 
     def without(self, blocks: np.ndarray) -> "JointGram":
         """The same without some blocks, shape (B,)."""
@@ -146,18 +146,18 @@ class JointGram:
             total, rows = total + worth * gram, rows + worth * count
         return np.asarray(total), rows
 
-    def at(self, setting: Setting, instrument: bool = True) -> Integrated:
+    def at(self, hyper: JointHyper, instrument: bool = True) -> Integrated:
         """Own nuisances integrated out; kept, for a search asks for the same ones thousands of times.
 
         Args:
-            setting: Sizes and level.
+            hyper: Sizes and level.
             instrument: Whether the instrument may err within its stated widths; otherwise it is taken to be right.
         """
-        key = setting, instrument
+        key = hyper, instrument
         if key not in self._kept:
             if len(self._kept) >= REMEMBERED:
                 self._kept.pop(next(iter(self._kept)))
-            self._kept[key] = self._integrated(setting, instrument)
+            self._kept[key] = self._integrated(hyper, instrument)
         else:
             self._kept[key] = self._kept.pop(key)  # most recently used last
         return self._kept[key]
@@ -166,8 +166,8 @@ class JointGram:
         """Drop what is kept: hundreds of megabytes, once a search is over."""
         self._kept.clear()
 
-    def _integrated(self, setting: Setting, instrument: bool) -> Integrated:
-        level, size, D = LEVELS[setting[-1]], own_scale(self.groups, setting), len(self.groups)
+    def _integrated(self, hyper: JointHyper, instrument: bool) -> Integrated:
+        level, size, D = LEVELS[hyper[-1]], own_scale(self.groups, hyper), len(self.groups)
         used = np.flatnonzero((size > 0.0) & (instrument | (self.groups >= 0)))
         total, rows = self.weighted(level)
         s = size[used]
@@ -176,7 +176,7 @@ class JointGram:
         half = linalg.solve_triangular(chol, s[:, None] * total[used, D:] / level**2, lower=True, check_finite=False)
         left = total[-1, -1] / level**2 - half[:, -1] @ half[:, -1]
         constant = -float(np.log(np.diag(chol)).sum()) - rows * np.log(level) - 0.5 * left
-        return Integrated(total, level, used, s, chol, half, constant + log_prior(setting))
+        return Integrated(total, level, used, s, chol, half, constant + log_prior(hyper))
 
 
 def _sum(blocks: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -184,9 +184,9 @@ def _sum(blocks: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return blocks[0] if len(blocks) == 1 and weights[0] == 1.0 else np.tensordot(weights, blocks, 1)
 
 
-def own_scale(groups: np.ndarray, setting: Setting) -> np.ndarray:
+def own_scale(groups: np.ndarray, hyper: JointHyper) -> np.ndarray:
     """Prior standard deviation of each own column."""
-    sizes = np.array([1.0, *(SIZES[i] for i in setting[:-1])])
+    sizes = np.array([1.0, *(settings.DISCREPANCY_SIZES[i] for i in hyper[:-1])])
     return sizes[groups + 1]
 
 

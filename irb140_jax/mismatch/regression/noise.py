@@ -13,13 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import linalg, signal
 
+from irb140_jax.mismatch import settings
+
 ORDER = 10  # lags; at about twice the band this spans a quarter of a second
 SPECTRUM = 256  # points of the spectrum
 RIDGE = 1e-3
-ENOUGH = 0.5  # of the rows, which must have all their lags for correlations to be known pair by pair
 ROUNDS = 5  # in which noise and what some rows are unsure by beside it are told apart
-LEAST = 0.2  # of a residual, that is noise
-NEGLIGIBLE = 0.1  # weight of every lag, of the row's own, below which noise is white: no row needs those before it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,7 +149,7 @@ def _size(residual: np.ndarray, unsure: np.ndarray) -> float:
     """Standard deviation of the noise in a residual that is unsure by more in some rows; 0 without rows."""
     size = whole = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
     for _ in range(ROUNDS if whole > 0.0 else 0):
-        size = max(float(np.sqrt(np.mean((residual / spread(unsure, size)) ** 2))), LEAST * whole)
+        size = max(float(np.sqrt(np.mean((residual / spread(unsure, size)) ** 2))), settings.LEAST_NOISE * whole)
     return size
 
 
@@ -165,7 +164,7 @@ def _per_pair(products: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     """Autocovariances per pair; as they are where gaps leave few pairs or the estimate has a spectrum below zero."""
     covariances = products * pairs[0] / np.maximum(pairs, 1)
     possible = np.linalg.eigvalsh(linalg.toeplitz(covariances))[0] > 0.0
-    return covariances if possible and pairs[-1] > ENOUGH * pairs[0] else products
+    return covariances if possible and pairs[-1] > settings.ENOUGH_LAGS * pairs[0] else products
 
 
 def _whitener(acov: np.ndarray) -> tuple[np.ndarray, float]:
@@ -179,7 +178,7 @@ def _whitener(acov: np.ndarray) -> tuple[np.ndarray, float]:
     acov = np.fft.irfft(rising, SPECTRUM)[: ORDER + 1]
     acov = acov / acov[0]
     a, variance = _yule_walker(acov)
-    if np.abs(a[1:]).max() < NEGLIGIBLE:
+    if np.abs(a[1:]).max() < settings.NEGLIGIBLE_LAG:
         return np.eye(1, ORDER + 1)[0], float(np.sqrt(acov[0]))
     return a, float(np.sqrt(variance))
 

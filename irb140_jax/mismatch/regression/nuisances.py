@@ -6,17 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.effects import Scales
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Prepared
 from irb140_jax.mismatch.regression.discrepancy import features
 from irb140_jax.mismatch.regression.servo import scale_width, servo_columns
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
-GAIN_COMMON, GAIN_JOINT = 0.10, 0.03  # torque scale of all joints, and of each beside it
-DELAY_COMMON, DELAY_JOINT = 1e-3, 5e-4  # s between torque and position channels
-SMOOTHED = 2e-5  # s^2 of the torque's second derivative: what smoothing takes off accelerations that noise hides
-ROTOR = 0.10  # of the stated armature
-BIAS = 0.10  # of the joint's torque: what differs by direction may go on through a reversal, or vanish there
 # A joint's own columns with stated widths, in their order; those of a servo come after them.
 FIXED = ("gain", "delay", "rotor", "smoothing", "bias")
 # Blocks of a joint whose size is learned from the recordings.
@@ -77,14 +73,15 @@ def nuisances(
     for r, (a, (load, total)) in enumerate(zip(along, torques, strict=True)):
         motion, dt = a.recording, float(np.mean(np.diff(a.recording.t)))
         rate = np.gradient(total, dt, axis=0)
-        bend = SMOOTHED * np.gradient(rate, dt, axis=0)
-        commons.append(band.apply(np.stack([GAIN_COMMON * load, DELAY_COMMON * rate, 2.0 * bend], axis=-1)))
+        bend = settings.SMOOTHED * np.gradient(rate, dt, axis=0)
+        common = settings.GAIN_COMMON * load, settings.DELAY_COMMON * rate, 2.0 * bend
+        commons.append(band.apply(np.stack(common, axis=-1)))
         joints = []
         for j in range(n):
-            rotor = ROTOR * float(robot.armature[j]) * motion.qdd[:, j]
-            bias = BIAS * scales.torque[j] * (1.0 - np.abs(motion.direction[:, j]))
-            gain = np.hypot(GAIN_JOINT, scale_width(motion, j)) * load[:, j]
-            fixed = np.stack([gain, DELAY_JOINT * rate[:, j], rotor, bend[:, j], bias], axis=1)
+            rotor = settings.ROTOR_ERROR * float(robot.armature[j]) * motion.qdd[:, j]
+            bias = settings.BIAS * scales.torque[j] * (1.0 - np.abs(motion.direction[:, j]))
+            gain = np.hypot(settings.GAIN_JOINT, scale_width(motion, j)) * load[:, j]
+            fixed = np.stack([gain, settings.DELAY_JOINT * rate[:, j], rotor, bend[:, j], bias], axis=1)
             fixed = np.concatenate([fixed, servo_columns(motion, j)], axis=1)
             # Levels of dry and viscous friction about their mean, a law's; of one recording there is nothing beside it.
             own = (np.arange(count) == r) - 1.0 / count if count > 1 else np.zeros(0)

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax import dynamics
+from irb140_jax.mismatch import settings
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
@@ -15,7 +16,6 @@ from irb140_jax.recordings.sensors import torque_scatter
 from irb140_jax.robot import Robot
 
 POSES = 100  # of a recording, over which the mass matrix is averaged
-COARSE = 3.0  # times the noise of the torque sensors: encoder noise above it is worth a note
 
 _masses = eqx.filter_jit(jax.vmap(dynamics.mass_matrix, in_axes=(None, 0)))
 
@@ -39,14 +39,14 @@ def scatter_by_sensor(
 
 
 def coarse_positions(robot: Robot, by_torque: np.ndarray, by_encoder: np.ndarray, judged: np.ndarray) -> list[str]:
-    """A note where the encoders, and not the torque sensors, limit what can be seen: `COARSE` times as loud.
+    """A note where the encoders, and not the torque sensors, limit what can be seen: `settings.COARSE` times as loud.
 
     Args:
         robot: The nominal model.
         by_torque, by_encoder: From `scatter_by_sensor`, shape (n,) [N m or N].
         judged: Joints of which enough rows tell, shape (n,).
     """
-    coarse = np.flatnonzero(judged & (by_encoder > COARSE * by_torque))
+    coarse = np.flatnonzero(judged & (by_encoder > settings.COARSE * by_torque))
     if not len(coarse):
         return []
     each = ", ".join(

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from irb140_jax.mismatch.regression.assemble import FEWEST_ROWS as FEWEST_OF_A_JOINT
+from irb140_jax.mismatch import settings
 from irb140_jax.recordings.channels import with_lost_torque_marked
 from irb140_jax.recordings.check import MOVING, checked_numbers
 from irb140_jax.recordings.condition import Commanded, Conditioned, choose_band, conditioned
@@ -15,8 +15,7 @@ from irb140_jax.recordings.repeats import with_motions_numbered, without_copies
 from irb140_jax.recordings.servo import with_servo_torques
 from irb140_jax.robot import Robot
 
-FEWEST_ROWS = 80  # low-passed rows of all recordings together, below which nothing can be said
-FEWEST_OF_ONE = 16  # of one recording: fewer have no blocks to leave out, and no noise to measure
+MORE = "record at least 15 s in which every joint moves, with a dozen reversals"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,11 +95,11 @@ def comparable(
         band = choose_band(list(recordings), robot)
         smooth, again = with_motions_numbered(conditioned(recordings, band), recordings)
         rows = [len(band.kept(len(r.t))) for r in smooth]
-        short = [k for k, count in enumerate(rows) if count < FEWEST_OF_ONE]
+        short = [k for k, count in enumerate(rows) if count < settings.FEWEST_ROWS_OF_RECORDING]
         if not short or len(short) == len(rows):
             return band, list(recordings), smooth, left_out + again
         left_out += [f"{smooth[k].source} is left out: {rows[k]} samples below {band.torque:.3g} Hz remain of it, and "
-                     f"{FEWEST_OF_ONE} are needed." for k in short]  # fmt: skip
+                     f"{settings.FEWEST_ROWS_OF_RECORDING} are needed." for k in short]  # fmt: skip
         recordings = [r for k, r in enumerate(recordings) if k not in short]
 
 
@@ -112,15 +111,15 @@ def usable_rows(smooth: Sequence[Conditioned], band: Band) -> np.ndarray:
 def too_little(smooth: Sequence[Conditioned], band: Band) -> str:
     """Why no joint at all can be compared, and what to record; empty where one can."""
     rows = sum(len(band.kept(len(r.t))) for r in smooth)
-    if rows < FEWEST_ROWS:
+    if rows < settings.FEWEST_ROWS:
         return (
-            f"Only {rows} samples below {band.torque:.3g} Hz can be compared with the model, and {FEWEST_ROWS} are "
-            "needed: record at least 15 s in which every joint moves, with a dozen reversals"
+            f"Only {rows} samples below {band.torque:.3g} Hz can be compared with the model, and "
+            f"{settings.FEWEST_ROWS} are needed: {MORE}"
         )
     most = int(usable_rows(smooth, band).max())
-    if most < FEWEST_OF_A_JOINT:
+    if most < settings.FEWEST_ROWS_OF_JOINT:
         return (
             f"No joint moves for long enough: at most {most} samples of one can be compared with the model, and "
-            f"{FEWEST_OF_A_JOINT} are needed: record at least 15 s in which every joint moves, with a dozen reversals"
+            f"{settings.FEWEST_ROWS_OF_JOINT} are needed: {MORE}"
         )
     return ""

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
-
-WITHIN = 15.0  # nats of the best set: others weigh less than one in a million
 
 Site = tuple[str, tuple[int, ...]]
 Sets = Mapping[frozenset[int], float]  # log posterior of sets of candidates
@@ -16,7 +15,8 @@ Sets = Mapping[frozenset[int], float]  # log posterior of sets of candidates
 def weights(sets: Sets) -> dict[frozenset[int], float]:
     """Probability of each set within `WITHIN` of the best."""
     top = max(sets.values())
-    near = {s: float(np.exp(v - top)) for s, v in sets.items() if top - v <= WITHIN} if np.isfinite(top) else {}
+    close = {s: v for s, v in sets.items() if top - v <= settings.WITHIN} if np.isfinite(top) else {}
+    near = {s: float(np.exp(v - top)) for s, v in close.items()}
     total = sum(near.values())
     return {s: w / total for s, w in near.items()}
 

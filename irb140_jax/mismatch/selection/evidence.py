@@ -8,19 +8,18 @@ import numpy as np
 from scipy import linalg, special
 
 from irb140_jax.effects import At
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.beside import Beside
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gaussian import posterior, root, with_prior
-from irb140_jax.mismatch.regression.gram import LEVELS, SIZES, JointGram, Setting
+from irb140_jax.mismatch.regression.gram import LEVELS, JointGram, JointHyper
 from irb140_jax.mismatch.selection.kinds import Kinds
 
-Settings = tuple[Setting, ...]  # one a joint
+Hyper = tuple[JointHyper, ...]  # hyperparameters, one a joint
 DRY = "coulomb_friction"
-# True over stated error of the inertials, in octaves: five of six statements are right within a factor of two, and some
-# are far too small.
-OCTAVES = np.arange(-1.0, 6.0)
-WIDTHS = 2.0**OCTAVES
-LOG_PRIOR = -np.log1p(OCTAVES**2) - special.logsumexp(-np.log1p(OCTAVES**2))  # a Cauchy distribution, cut off
+WIDTHS = 2.0**settings.WIDTH_OCTAVES  # true over stated error of the inertials
+_FALL = -np.log1p(settings.WIDTH_OCTAVES**2)
+LOG_PRIOR = _FALL - special.logsumexp(_FALL)  # a Cauchy distribution over octaves, cut off
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,13 +109,13 @@ class Space:
         return {}
 
     def gram(
-        self, settings: Settings, rows: np.ndarray, columns: np.ndarray, only: Sequence[int] | None = None,
+        self, hyper: Hyper, rows: np.ndarray, columns: np.ndarray, only: Sequence[int] | None = None,
         *, instrument: bool = True,
     ) -> np.ndarray:  # fmt: skip
         """Gram matrix of some shared columns with others, summed over joints; number `size` is y.
 
         Args:
-            settings: Sizes and levels.
+            hyper: Sizes and levels.
             rows, columns: Which.
             only: Joints to sum over, all by default.
             instrument: See `JointGram.at`.
@@ -126,7 +125,7 @@ class Space:
             across, down = self.places[j][rows], self.places[j][columns]
             r, c = np.flatnonzero(across >= 0), np.flatnonzero(down >= 0)
             if len(r) and len(c):
-                H[np.ix_(r, c)] += self.joints[j].at(settings[j], instrument).left(across[r], down[c])
+                H[np.ix_(r, c)] += self.joints[j].at(hyper[j], instrument).left(across[r], down[c])
         return H
 
     def with_y(self, columns: np.ndarray) -> np.ndarray:
@@ -137,46 +136,46 @@ class Space:
         """Shared columns of a set: inertials and common nuisances, then the members' amplitudes."""
         return np.concatenate([np.arange(self.offset), *(self.columns[c] for c in chosen)])
 
-    def constant(self, settings: Settings) -> float:
+    def constant(self, hyper: Hyper) -> float:
         """What sizes and levels add to the log evidence of any set."""
-        return sum(g.at(s).constant for g, s in zip(self.joints, settings, strict=True))
+        return sum(g.at(s).constant for g, s in zip(self.joints, hyper, strict=True))
 
-    def log_evidence(self, chosen: Sequence[int], settings: Settings) -> float:
+    def log_evidence(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """Log evidence and prior of a set; -inf where its amplitudes are inadmissible."""
-        H, by_width = self._by_width(chosen, settings)
-        if self._impossible(chosen, H, self.prior(chosen, settings)):
+        H, by_width = self._by_width(chosen, hyper)
+        if self._impossible(chosen, H, self.prior(chosen, hyper)):
             return -np.inf
-        return self.constant(settings) + self._prior(chosen) + float(np.logaddexp.reduce(by_width))
+        return self.constant(hyper) + self._prior(chosen) + float(np.logaddexp.reduce(by_width))
 
-    def _by_width(self, chosen: Sequence[int], settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    def _by_width(self, chosen: Sequence[int], hyper: Hyper) -> tuple[np.ndarray, np.ndarray]:
         """Gram matrix of a set's columns and y, and log evidence and prior at each width of the inertials' prior."""
         every = self.with_y(self.set_columns(chosen))
-        H = self.gram(settings, every, every)
+        H = self.gram(hyper, every, every)
         by_width = _width_evidences(H, self.inertials)
-        self._widths[tuple(sorted(chosen)), settings] = float(WIDTHS[np.argmax(by_width)])
+        self._widths[tuple(sorted(chosen)), hyper] = float(WIDTHS[np.argmax(by_width)])
         return H, by_width
 
-    def width(self, chosen: Sequence[int], settings: Settings) -> float:
+    def width(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """True over stated error of the inertials that is most probable beside a set."""
-        key = tuple(sorted(chosen)), settings
+        key = tuple(sorted(chosen)), hyper
         if key not in self._widths:
-            self._by_width(chosen, settings)
+            self._by_width(chosen, hyper)
         return self._widths[key]
 
     @cached_property
     def _widths(self) -> dict[tuple, float]:
         return {}
 
-    def prior(self, chosen: Sequence[int], settings: Settings) -> np.ndarray:
+    def prior(self, chosen: Sequence[int], hyper: Hyper) -> np.ndarray:
         """Prior standard deviations of a set's columns, in units of those that were stated."""
         out = np.ones(self.offset + sum(len(self.columns[c]) for c in chosen))
-        out[: self.inertials] = self.width(chosen, settings)
+        out[: self.inertials] = self.width(chosen, hyper)
         return out
 
-    def torque_scale_odds(self, chosen: Sequence[int], settings: Settings) -> float:
+    def torque_scale_odds(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """Log evidence for one scale of all torques, the first of the common nuisances, over that of none."""
         every = self.with_y(self.set_columns(chosen))
-        H = self.gram(settings, every, every)
+        H = self.gram(hyper, every, every)
         without = np.delete(np.delete(H, self.inertials, axis=0), self.inertials, axis=1)
         free, none = (float(np.logaddexp.reduce(_width_evidences(x, self.inertials))) for x in (H, without))
         return free - none
@@ -185,7 +184,7 @@ class Space:
         return float(sum(self.log_prior[c] for c in chosen)) + self.kinds.log_prior(chosen)
 
     def posterior(
-        self, chosen: Sequence[int], settings: Settings, *, instrument: bool = True, scaled: bool = False
+        self, chosen: Sequence[int], hyper: Hyper, *, instrument: bool = True, scaled: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
         """Mean and covariance of inertials, common nuisances and amplitudes, in prior units.
 
@@ -193,7 +192,7 @@ class Space:
 
         Args:
             chosen: The set.
-            settings: Sizes and levels.
+            hyper: Sizes and levels.
             instrument: Whether the instrument may err within its stated widths; otherwise its part is zero ...
             scaled: ... but for one scale of all torques, the first of the common nuisances.
         """
@@ -201,53 +200,53 @@ class Space:
         free = np.ones(len(every) - 1, dtype=bool)
         free[self.inertials : self.offset] = instrument
         free[self.inertials] |= scaled
-        H = self.gram(settings, every, every, instrument=instrument)
+        H = self.gram(hyper, every, every, instrument=instrument)
         at = np.flatnonzero(free)
         mean, cov = np.zeros(len(free)), np.zeros((len(free), len(free)))
         ends = np.cumsum([len(self.columns[c]) for c in chosen], dtype=int) + np.count_nonzero(free[: self.offset])
         named = [slice(int(e) - len(self.columns[c]), int(e)) for c, e in zip(chosen, ends, strict=True)
                  if self.candidates[c].slug != "inertials"]  # fmt: skip
         found = posterior(np.pad(H[np.ix_(at, at)], (0, 1)) + np.pad(H[at, -1:], ((0, 1), (len(at), 0))),
-                          np.arange(len(at)), named, self.prior(chosen, settings)[at])  # fmt: skip
+                          np.arange(len(at)), named, self.prior(chosen, hyper)[at])  # fmt: skip
         mean[at], cov[np.ix_(at, at)] = found.mean, found.cov
         return mean, cov
 
     def own(
-        self, joint: int, setting: Setting, columns: np.ndarray, mean: np.ndarray, *, instrument: bool
+        self, joint: int, of_joint: JointHyper, columns: np.ndarray, mean: np.ndarray, *, instrument: bool
     ) -> np.ndarray:
         """Mean of a joint's own nuisances beside a set, shape (D,).
 
         Args:
             joint: Which.
-            setting: Its sizes and level.
+            of_joint: Its sizes and level.
             columns: Shared columns of the set.
             mean: Their mean.
             instrument: See `JointGram.at`.
         """
-        own, at = self.joints[joint].at(setting, instrument).own(), self.places[joint][columns]
+        own, at = self.joints[joint].at(of_joint, instrument).own(), self.places[joint][columns]
         return own[:, -1] - own[:, at[at >= 0]] @ mean[at >= 0]
 
     def settled(
-        self, chosen: Sequence[int], settings: Settings, joints: Sequence[int] | None = None
-    ) -> tuple[float, Settings]:
+        self, chosen: Sequence[int], hyper: Hyper, joints: Sequence[int] | None = None
+    ) -> tuple[float, Hyper]:
         """Sizes and levels that are best for a set, by ascent on their grids, at some joints or all.
 
         Returns:
-            Log posterior of the set, summed over shapes, -inf where it is inadmissible; and the settings.
+            Log posterior of the set, summed over shapes, -inf where it is inadmissible; and the hyperparameters.
         """
         joints = range(len(self.joints)) if joints is None else joints
         index = self.with_y(self.set_columns(chosen))
         moved = True
         while moved:
             moved = False
-            prior = self.prior(chosen, settings)
+            prior = self.prior(chosen, hyper)
             for j in joints:
-                better = self._climbed(index, settings, j, prior)
-                moved |= better != settings and len(joints) > 1
-                settings = better
-        return self.log_evidence(chosen, settings) + self.over_shapes(chosen, settings), settings
+                better = self._climbed(index, hyper, j, prior)
+                moved |= better != hyper and len(joints) > 1
+                hyper = better
+        return self.log_evidence(chosen, hyper) + self.over_shapes(chosen, hyper), hyper
 
-    def over_shapes(self, chosen: Sequence[int], settings: Settings) -> float:
+    def over_shapes(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """What a set's log posterior gains where the shapes of its members are summed over instead of the best ones.
 
         One member at a time, the others' shapes as they are.
@@ -257,9 +256,9 @@ class Space:
             if len(alike := self._alike[c]) > 1:
                 rest = tuple(i for i in chosen if i != c)
                 near = frozenset(i for i in rest if self.at_joint[list(self.candidates[c].joints), i].any())
-                key = c, near, tuple(settings[j] for j in self.candidates[c].joints)
+                key = c, near, tuple(hyper[j] for j in self.candidates[c].joints)
                 if key not in self._summed:
-                    gains = self.gains(rest, settings, np.array(alike))
+                    gains = self.gains(rest, hyper, np.array(alike))
                     own = gains[alike.index(c)]
                     self._summed[key] = float(special.logsumexp(gains) - own) if np.isfinite(own) else 0.0
                 out += self._summed[key]
@@ -278,16 +277,16 @@ class Space:
             groups.setdefault(key, []).append(i)
         return [groups[key] for key in keys]
 
-    def _climbed(self, index: np.ndarray, settings: Settings, j: int, prior: np.ndarray) -> Settings:
-        """The settings with those of one joint at their best beside a set whose columns have these prior widths."""
+    def _climbed(self, index: np.ndarray, hyper: Hyper, j: int, prior: np.ndarray) -> Hyper:
+        """Hyperparameters, those of one joint at their best beside a set whose columns have these prior widths."""
         gram = self.joints[j]
-        rest = self.gram(settings, index, index, [i for i in range(len(self.joints)) if i != j])
+        rest = self.gram(hyper, index, index, [i for i in range(len(self.joints)) if i != j])
         at = self.places[j][index]
         mine = np.flatnonzero(at >= 0)
         into, take = np.ix_(mine, mine), at[mine]
-        known: dict[Setting, float] = {}
+        known: dict[JointHyper, float] = {}
 
-        def values(tries: list[Setting]) -> None:
+        def values(tries: list[JointHyper]) -> None:
             new = [s for s in tries if s not in known]
             H = np.repeat(rest[None], len(new), axis=0)
             for k, s in enumerate(new):
@@ -295,26 +294,26 @@ class Space:
             for s, value in zip(new, _log_evidences(H, prior) if new else (), strict=True):
                 known[s] = gram.at(s).constant + float(value)
 
-        now = settings[j]
+        now = hyper[j]
         while True:
             near = _near(now, gram.lowest)
             values([now, *near])
             best = max(near, key=lambda s: known[s])
             if known[best] <= known[now] + LEAST:
-                return (*settings[:j], now, *settings[j + 1 :])
+                return (*hyper[:j], now, *hyper[j + 1 :])
             now = best
 
-    def inadmissible(self, chosen: Sequence[int], settings: Settings) -> list[int]:
+    def inadmissible(self, chosen: Sequence[int], hyper: Hyper) -> list[int]:
         """Members of a set whose amplitudes are not such as can be."""
         every = self.with_y(self.set_columns(chosen))
-        return self._impossible(chosen, self.gram(settings, every, every), self.prior(chosen, settings))
+        return self._impossible(chosen, self.gram(hyper, every, every), self.prior(chosen, hyper))
 
-    def reshaped(self, chosen: Sequence[int], settings: Settings) -> tuple[int, ...]:
+    def reshaped(self, chosen: Sequence[int], hyper: Hyper) -> tuple[int, ...]:
         """The set with the best other shape for each member whose amplitudes can't be at its own, if there is one."""
         now = list(chosen)
-        for c in self.inadmissible(chosen, settings):
+        for c in self.inadmissible(chosen, hyper):
             rest = tuple(i for i in now if i != c)
-            gains = self.gains(rest, settings, np.array(self._alike[c]))
+            gains = self.gains(rest, hyper, np.array(self._alike[c]))
             if np.isfinite(gains).any():
                 now = [*rest, self._alike[c][int(np.argmax(gains))]]
         return tuple(sorted(now))
@@ -335,28 +334,28 @@ class Space:
         bad = np.any((mean < self.lowest[which, :k] - 1e-9) | (mean > self.highest[which, :k] + 1e-9), axis=1)
         return bad | (np.sum(mean * self.weights[which, :k], axis=1) < self.least[which])
 
-    def near(self, chosen: Sequence[int], settings: Settings, columns: np.ndarray) -> np.ndarray:
+    def near(self, chosen: Sequence[int], hyper: Hyper, columns: np.ndarray) -> np.ndarray:
         """Gram matrix of some shared columns and y, inertials, nuisances and a set integrated out."""
-        base, extra, prior = self.set_columns(chosen), self.with_y(columns), self.prior(chosen, settings)
-        chol = root(with_prior(self.gram(settings, base, base) * np.outer(prior, prior)))
-        across = prior[:, None] * self.gram(settings, base, extra)
+        base, extra, prior = self.set_columns(chosen), self.with_y(columns), self.prior(chosen, hyper)
+        chol = root(with_prior(self.gram(hyper, base, base) * np.outer(prior, prior)))
+        across = prior[:, None] * self.gram(hyper, base, extra)
         half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
-        return self.gram(settings, extra, extra) - half.T @ half
+        return self.gram(hyper, extra, extra) - half.T @ half
 
-    def gains(self, chosen: Sequence[int], settings: Settings, which: np.ndarray) -> np.ndarray:
-        """Log posterior odds of adding each of some candidates to a set at these settings; -inf if inadmissible."""
+    def gains(self, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) -> np.ndarray:
+        """Log posterior odds of adding each of some candidates to a set; -inf if inadmissible."""
         out = np.full(len(which), -np.inf)
         if not len(which):
             return out
         extra = np.unique(np.concatenate([self.columns[i] for i in which]))
         number = np.full(self.size, -1)
         number[extra] = np.arange(len(extra))
-        base, prior = self.set_columns(chosen), self.prior(chosen, settings)
+        base, prior = self.set_columns(chosen), self.prior(chosen, hyper)
         more = self.kinds.one_more(chosen)
-        chol = root(with_prior(self.gram(settings, base, base) * np.outer(prior, prior)))
-        across = prior[:, None] * self.gram(settings, base, self.with_y(extra))
+        chol = root(with_prior(self.gram(hyper, base, base) * np.outer(prior, prior)))
+        across = prior[:, None] * self.gram(hyper, base, self.with_y(extra))
         half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
-        with_y = self.gram(settings, extra, np.array([self.size]))[:, 0] - half[:, :-1].T @ half[:, -1]
+        with_y = self.gram(hyper, extra, np.array([self.size]))[:, 0] - half[:, :-1].T @ half[:, -1]
         by_size: dict[int, list[int]] = {}
         for m, i in enumerate(which):
             by_size.setdefault(len(self.columns[i]), []).append(m)
@@ -366,11 +365,11 @@ class Space:
             part = half[:, at]
             each = np.moveaxis(part, 0, 1)
             M = np.eye(k) - np.swapaxes(each, 1, 2) @ each
-            for g, setting, place in zip(self.joints, settings, self.places, strict=True):
+            for g, of_joint, place in zip(self.joints, hyper, self.places, strict=True):
                 mine = place[columns]
                 moved = np.flatnonzero((mine >= 0).any(axis=1))
                 if len(moved):
-                    M[moved] += g.at(setting).blocks(mine[moved])
+                    M[moved] += g.at(of_joint).blocks(mine[moved])
             rhs = with_y[at]
             mean = np.linalg.solve(M, rhs[..., None])[..., 0]
             gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
@@ -382,14 +381,14 @@ class Space:
 LEAST = 1e-3  # nats that a step of a size or a level must gain
 
 
-def _near(setting: Setting, lowest: int) -> list[Setting]:
-    """Neighbours of a setting on the grid, with no level below the lowest."""
-    bounds = [*([(0, len(SIZES))] * (len(setting) - 1)), (lowest, len(LEVELS))]
+def _near(hyper: JointHyper, lowest: int) -> list[JointHyper]:
+    """Neighbours on the grid, with no level below the lowest."""
+    bounds = [*([(0, len(settings.DISCREPANCY_SIZES))] * (len(hyper) - 1)), (lowest, len(LEVELS))]
     out = []
     for axis, (bottom, top) in enumerate(bounds):
         for step in (-1, 1):
-            if bottom <= setting[axis] + step < top:
-                out.append((*setting[:axis], setting[axis] + step, *setting[axis + 1 :]))
+            if bottom <= hyper[axis] + step < top:
+                out.append((*hyper[:axis], hyper[axis] + step, *hyper[axis + 1 :]))
     return out
 
 

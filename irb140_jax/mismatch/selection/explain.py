@@ -7,18 +7,12 @@ from functools import partial
 import numpy as np
 
 from irb140_jax.effects import Effect
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Loads, Prepared, all_prepared, columns_along, scales_of, seen_by
 from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, reshaped
 from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, composed, library_of
 from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
-from irb140_jax.mismatch.regression.assemble import (
-    BLOCKS,
-    Data,
-    assembled,
-    judged,
-    prior_scale,
-    with_loose_inertials,
-)
+from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
 from irb140_jax.mismatch.regression.gram import grams_by_block, joint_grams, summed
 from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.regression.nuisances import Nuisances, nuisances
@@ -41,7 +35,6 @@ from irb140_jax.robot import Robot
 
 PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both ...
 MOST_PASSES = 8  # ... unless shapes become finer and finer:
-SETTLED = 0.1  # relative change of the noise from round to round
 
 
 def explain(
@@ -91,17 +84,17 @@ def explain(
         del sums  # hundreds of megabytes, before the search
         space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
         # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
-        best, settings, sets = selected(space, chosen, every_move=turn == 1 or last)
+        best, hyper, sets = selected(space, chosen, every_move=turn == 1 or last)
         if at and not at.rests_on <= {site_of(data.candidates[i]) for i in best}:
             # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
             return explained(None, turn, last=last)
-        best, settings = named(space, best, settings, sets) if last else (best, settings)
+        best, hyper = named(space, best, hyper, sets) if last else (best, hyper)
         for joint in joints:
             joint.forget()
         members = [data.candidates[i] for i in best]
         held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
         data = dataclasses.replace(data, stretches=held)
-        ex = Explanation(lib, scales, data, extra, whitening, space, space, best, settings, sets, factor)
+        ex = Explanation(lib, scales, data, extra, whitening, space, space, best, hyper, sets, factor)
         return _by_block(ex, sensors) if last else ex
 
     turn, coarse, off = 1, False, False
@@ -114,7 +107,7 @@ def explain(
         torques = [_torques(robot, physics, found[0], r, i) for i, r in enumerate(along)]
         loads = [t.loads for t in torques]
         off = _off(ex, torques, band)
-        noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.settings)
+        noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
         coarse = _coarse(ex, noise)
         # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
         lib, chosen = _refined(_without_discrepancy(ex) if turn == 1 or coarse else ex)
@@ -135,7 +128,7 @@ def _first_noise(
 
 def _by_block(ex: Explanation, sensors: np.ndarray) -> Explanation:
     """The explanation with Gram matrices of what it names by block of the data, to leave some out."""
-    joints = grams_by_block(ex.data, ex.extra, ex.noise, sensors, ex.columns(), BLOCKS)
+    joints = grams_by_block(ex.data, ex.extra, ex.noise, sensors, ex.columns(), settings.BLOCKS)
     return dataclasses.replace(ex, by_block=dataclasses.replace(ex.space, joints=joints))
 
 
@@ -162,7 +155,7 @@ def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
     """
     post = ex.posterior()
     w = post.mean * ex.data.scale[post.columns]
-    square = np.zeros(len(ex.settings))
+    square = np.zeros(len(ex.hyper))
     for s, t in zip(ex.data.stretches, torques, strict=True):
         linear = s.tau - s.y + s.of(post.columns) @ w
         square += np.sum(np.where(s.use, band.apply(t.corrected) - linear, 0.0) ** 2, axis=0)
@@ -172,7 +165,7 @@ def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
 
 def _without_discrepancy(ex: Explanation) -> Explanation:
     """The explanation as if its laws were exact."""
-    return dataclasses.replace(ex, settings=tuple((*(0 for _ in s[:-1]), s[-1]) for s in ex.settings))
+    return dataclasses.replace(ex, hyper=tuple((*(0 for _ in s[:-1]), s[-1]) for s in ex.hyper))
 
 
 def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
@@ -207,7 +200,7 @@ def _coarse(ex: Explanation, left: Noise) -> bool:
     """
     shaped = [j for m in ex.members if m.effect.shapes.finer for j in m.joints]
     was, now = (np.sqrt(np.mean(noise.total**2, axis=0)) for noise in (ex.noise, left))
-    return bool(np.any(np.abs(np.log(now / was))[shaped] > SETTLED))
+    return bool(np.any(np.abs(np.log(now / was))[shaped] > settings.SETTLED_NOISE))
 
 
 def _peak(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:

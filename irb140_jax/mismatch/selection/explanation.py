@@ -6,15 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.effects import Scales
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
 from irb140_jax.mismatch.inertials.bodies import of_bodies
 from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gaussian import Posterior
 from irb140_jax.mismatch.regression.gram import LEVELS
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON, Nuisances
+from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities
-from irb140_jax.mismatch.selection.evidence import Settings, Space
+from irb140_jax.mismatch.selection.evidence import Hyper, Space
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Explanation:
         space: Gram matrices of all candidates, and priors.
         by_block: The same of what is named alone, by block of the data, once the search is over.
         chosen: Indices of the candidates that are named.
-        settings: Sizes of the discrepancy and noise levels of each joint beside them.
+        hyper: Sizes of the discrepancy and noise levels of each joint beside them.
         sets: Log posterior of every set that the search visited.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
         scaled: Whether one scale of all logged torques is a finding.
@@ -44,7 +45,7 @@ class Explanation:
     space: Space
     by_block: Space
     chosen: tuple[int, ...]
-    settings: Settings
+    hyper: Hyper
     sets: Sets
     factor: np.ndarray
     scaled: bool = False
@@ -57,7 +58,7 @@ class Explanation:
     @property
     def level(self) -> np.ndarray:
         """Standard deviation of the noise that is left at each joint, shape (n,) [N m or N]."""
-        return np.sqrt(np.mean(self.noise.total**2, axis=0)) * [LEVELS[s[-1]] for s in self.settings]
+        return np.sqrt(np.mean(self.noise.total**2, axis=0)) * [LEVELS[s[-1]] for s in self.hyper]
 
     def columns(self, chosen: tuple[int, ...] | None = None) -> np.ndarray:
         """Columns of the data that a set uses: inertials, then the amplitudes of its candidates."""
@@ -75,14 +76,14 @@ class Explanation:
         Without a member, others may have another shape.
         """
         value, members = -np.inf, tuple(sorted(chosen))
-        for other in dict.fromkeys((members, self.space.reshaped(members, self.settings))):
+        for other in dict.fromkeys((members, self.space.reshaped(members, self.hyper))):
             known = self.sets.get(frozenset(other))
-            value = max(value, self.space.settled(other, self.settings, joints)[0] if known is None else known)
+            value = max(value, self.space.settled(other, self.hyper, joints)[0] if known is None else known)
         return value
 
     def gains(self, chosen: tuple[int, ...], which: Sequence[int]) -> np.ndarray:
         """Log posterior odds of adding each of some candidates to a set, -inf where inadmissible."""
-        return self.space.gains(chosen, self.settings, np.asarray(which, dtype=int))
+        return self.space.gains(chosen, self.hyper, np.asarray(which, dtype=int))
 
     def near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
         """Gram matrix of some amplitudes' columns and y; inertials, nuisances and a set's amplitudes integrated out.
@@ -91,7 +92,7 @@ class Explanation:
             chosen: The set.
             columns: Columns of amplitudes, numbered from the first amplitude.
         """
-        return self.space.near(chosen, self.settings, columns + self.space.offset)
+        return self.space.near(chosen, self.hyper, columns + self.space.offset)
 
     def posterior(
         self, chosen: tuple[int, ...] | None = None, without: np.ndarray | None = None, *, instrument: bool = True
@@ -106,15 +107,15 @@ class Explanation:
         """
         chosen = self.chosen if chosen is None else chosen
         space = self.space if without is None else self.by_block.without(without)
-        mean, cov = space.posterior(chosen, self.settings, instrument=instrument, scaled=self.scaled)
+        mean, cov = space.posterior(chosen, self.hyper, instrument=instrument, scaled=self.scaled)
         keep = np.r_[0 : self.space.inertials, self.space.offset : len(mean)]
         return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
 
     def torque_scale(self) -> tuple[float, float]:
         """Logged over real torque of all joints alike, less one: mean and standard deviation."""
-        mean, cov = self.space.posterior(self.chosen, self.settings)
+        mean, cov = self.space.posterior(self.chosen, self.hyper)
         at = self.space.inertials
-        return GAIN_COMMON * float(mean[at]), GAIN_COMMON * float(np.sqrt(cov[at, at]))
+        return settings.GAIN_COMMON * float(mean[at]), settings.GAIN_COMMON * float(np.sqrt(cov[at, at]))
 
     def prediction(self, without: np.ndarray | None = None) -> tuple[Posterior, float, list[np.ndarray]]:
         """What predicts: possible inertials and amplitudes, the torque scale less one, and each joint's own columns.
@@ -123,13 +124,13 @@ class Explanation:
             without: Which blocks of the data are left out, shape (blocks,).
         """
         space = self.space if without is None else self.by_block.without(without)
-        mean, cov = space.posterior(self.chosen, self.settings, instrument=False, scaled=self.scaled)
+        mean, cov = space.posterior(self.chosen, self.hyper, instrument=False, scaled=self.scaled)
         mean = self.of_bodies(mean, cov, self.chosen, space.offset)
         columns = space.set_columns(self.chosen)
-        own = [space.own(j, s, columns, mean, instrument=False) for j, s in enumerate(self.settings)]
+        own = [space.own(j, s, columns, mean, instrument=False) for j, s in enumerate(self.hyper)]
         keep = np.r_[0 : space.inertials, space.offset : len(mean)]
         post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
-        return post, GAIN_COMMON * float(mean[space.inertials]), own
+        return post, settings.GAIN_COMMON * float(mean[space.inertials]), own
 
     def beside_instrument(self, without: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
         """Inertials and amplitudes, common nuisances, and each joint's own fixed ones: nothing of the discrepancy.
@@ -138,9 +139,9 @@ class Explanation:
             without: Which blocks of the data are left out, shape (blocks,).
         """
         space = self.by_block.without(without)
-        mean, _ = space.posterior(self.chosen, self.settings)
+        mean, _ = space.posterior(self.chosen, self.hyper)
         columns, keep = space.set_columns(self.chosen), np.r_[0 : space.inertials, space.offset : len(mean)]
-        own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(self.settings)]
+        own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(self.hyper)]
         fixed = [np.where(g.groups < 0, v, 0.0) for g, v in zip(space.joints, own, strict=True)]
         return mean[keep], mean[space.inertials : space.offset], fixed
 

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
-from irb140_jax.mismatch.regression.gram import SIZES
-from irb140_jax.mismatch.selection.evidence import Settings, Space
+from irb140_jax.mismatch.selection.evidence import Hyper, Space
 
 BEST = 3  # candidates of different kinds that a screening passes on to be judged in full
 LEAST = 1e-2  # nats that a move must gain
@@ -18,11 +18,11 @@ class Search:
 
     Args:
         space: What may be in a set.
-        settings: Where sizes and levels start.
+        hyper: Where sizes and levels start.
     """
 
-    def __init__(self, space: Space, settings: Settings):
-        self.space, self.start = space, settings
+    def __init__(self, space: Space, hyper: Hyper):
+        self.space, self.start = space, hyper
         alone = len(space.joints) == 1
         whole = [len(c.joints) == len(space.joints) and not alone for c in space.candidates]
         self._sites = [[i for i, c in enumerate(space.candidates) if j in c.joints and not whole[i]]
@@ -30,17 +30,17 @@ class Search:
         self._sites.append([i for i, w in enumerate(whole) if w])
         # What sizes of the discrepancy fitted anew may gain: the range of its features' prior volume.
         features = max(int(np.sum(g.groups >= 0)) for g in space.joints)
-        self._refitting = features * np.log(SIZES[-1] / SIZES[1])
-        self.visited: dict[frozenset[int], tuple[float, Settings]] = {}
+        self._refitting = features * np.log(settings.DISCREPANCY_SIZES[-1] / settings.DISCREPANCY_SIZES[1])
+        self.visited: dict[frozenset[int], tuple[float, Hyper]] = {}
         self._screened: dict[tuple[int, frozenset[int]], list[tuple[float, int]]] = {}
         self._in_vain: set[tuple[tuple[int, ...], frozenset[int]]] = set()
 
-    def judged(self, chosen: Iterable[int], settings: Settings, joints: Iterable[int] | None = None) -> float:
-        """Log posterior of a set, its settings fitted from some near ones."""
+    def judged(self, chosen: Iterable[int], hyper: Hyper, joints: Iterable[int] | None = None) -> float:
+        """Log posterior of a set, its hyperparameters fitted from some near ones."""
         key = frozenset(chosen)
         if key not in self.visited:
             at = sorted(set(joints)) if joints is not None else None
-            self.visited[key] = self.space.settled(tuple(sorted(key)), settings, at)
+            self.visited[key] = self.space.settled(tuple(sorted(key)), hyper, at)
         return self.visited[key][0]
 
     def run(self, chosen: Iterable[int] = (), *, every_move: bool = True) -> tuple[int, ...]:
@@ -76,19 +76,19 @@ class Search:
         self, now: frozenset[int], others: Iterable[tuple[frozenset[int], Iterable[int] | None]]
     ) -> frozenset[int]:
         """The best of some sets if it improves on a set, else that set."""
-        settings, best = self.visited[now][1], now
+        hyper, best = self.visited[now][1], now
         for other, joints in others:
-            other = self._possible(other, settings, joints)
+            other = self._possible(other, hyper, joints)
             if self._value(other) > self._value(best) + (LEAST if best == now else 0.0):
                 best = other
         return best
 
     def _possible(
-        self, chosen: frozenset[int], settings: Settings, joints: Iterable[int] | None
+        self, chosen: frozenset[int], hyper: Hyper, joints: Iterable[int] | None
     ) -> frozenset[int]:
         """A set, judged, with other shapes of members whose amplitudes can't be at theirs, or without those members."""
         seen: set[frozenset[int]] = set()
-        while not np.isfinite(self.judged(chosen, settings, joints)):
+        while not np.isfinite(self.judged(chosen, hyper, joints)):
             seen.add(chosen)
             members, at = tuple(sorted(chosen)), self.visited[chosen][1]
             other = frozenset(self.space.reshaped(members, at))
@@ -114,7 +114,7 @@ class Search:
     def _scored(self, chosen: frozenset[int], joint: int) -> list[tuple[float, int]]:
         """Log posterior of a set with each kind of candidate at a joint, best first, and the candidate.
 
-        By the set's own settings or by those with less discrepancy and noise, whichever makes more of them.
+        By the set's own hyperparameters or by those with less discrepancy and noise, whichever makes more of them.
         """
         near = frozenset(m for m in chosen if joint in self.space.candidates[m].joints)
         if (joint, near) not in self._screened or joint == len(self.space.joints):
@@ -122,7 +122,7 @@ class Search:
         return self._screened[joint, near]
 
     def _scored_anew(self, chosen: frozenset[int], joint: int) -> list[tuple[float, int]]:
-        space, settings = self.space, self.visited[chosen][1]
+        space, hyper = self.space, self.visited[chosen][1]
         bad = space.conflicts(tuple(chosen))
         which = np.array([i for i in self._sites[joint] if not bad[i] and i not in chosen], dtype=int)
         if not len(which):
@@ -131,13 +131,13 @@ class Search:
         joints = [joint] if joint < len(space.joints) else range(len(space.joints))
         lower = tuple(
             ((*(max(k - 2, 0) for k in own[:-1]), max(own[-1] - 2, space.joints[j].lowest)) if j in joints else own)
-            for j, own in enumerate(settings)
+            for j, own in enumerate(hyper)
         )
         lowest = tuple(
             ((*(min(k, 1) for k in own[:-1]), max(own[-1] - 6, space.joints[j].lowest)) if j in joints else own)
-            for j, own in enumerate(settings)
+            for j, own in enumerate(hyper)
         )
-        for trial in dict.fromkeys((settings, lower, lowest)):
+        for trial in dict.fromkeys((hyper, lower, lowest)):
             base = space.log_evidence(tuple(chosen), trial)
             if np.isfinite(base):
                 best = np.maximum(best, base + space.gains(tuple(chosen), trial, which))

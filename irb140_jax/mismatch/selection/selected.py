@@ -4,23 +4,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.assemble import Data
-from irb140_jax.mismatch.regression.gram import SIZES, START, own_scale
+from irb140_jax.mismatch.regression.gram import START, own_scale
 from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals, ridge
 from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, in_its_place
-from irb140_jax.mismatch.selection.evidence import Settings, Space
+from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.search import Search
 
-# Posterior probability, with that of what may stand in its place, from which an effect is named: odds of ten, "strong"
-# evidence in Jeffreys, Theory of Probability, 1961, app. B.
-NAMED = 0.9
-FREE = (*([len(SIZES) - 1] * (len(START) - 1)), START[-1])  # a discrepancy of any size
+FREE = (*([len(settings.DISCREPANCY_SIZES) - 1] * (len(START) - 1)), START[-1])  # a discrepancy of any size
 
 
 def selected(
     space: Space, chosen: Sequence[int] = (), *, every_move: bool = True
-) -> tuple[tuple[int, ...], Settings, Sets]:
+) -> tuple[tuple[int, ...], Hyper, Sets]:
     """Search for the best set.
 
     Args:
@@ -36,7 +34,7 @@ def selected(
     return best, search.visited[frozenset(best)][1], {s: v for s, (v, _) in search.visited.items()}
 
 
-def named(space: Space, best: tuple[int, ...], settings: Settings, sets: Sets) -> tuple[tuple[int, ...], Settings]:
+def named(space: Space, best: tuple[int, ...], hyper: Hyper, sets: Sets) -> tuple[tuple[int, ...], Hyper]:
     """What is stated: the members of a set that are probable together with what may stand in their place.
 
     Of sets that can't be told from the best one it is that with the fewest members: two names for what may be one need
@@ -45,18 +43,18 @@ def named(space: Space, best: tuple[int, ...], settings: Settings, sets: Sets) -
     Args:
         space: What may be in a set.
         best: The best set.
-        settings: Sizes and levels beside it.
+        hyper: Sizes and levels beside it.
         sets: Log posterior of every set visited.
 
     Returns:
         The members, and sizes and levels beside them.
     """
-    top, least = frozenset(best), sets[frozenset(best)] - np.log(NAMED / (1.0 - NAMED))
+    top, least = frozenset(best), sets[frozenset(best)] - np.log(settings.NAMED / (1.0 - settings.NAMED))
     # Whether one of its own members may be missing is for that member's probability to say.
     even = [s for s, value in sets.items() if value > least and not s < top]
     few = tuple(sorted(min(even, key=lambda s: (len(s), -sets[s]))))
-    sure = tuple(i for i in few if in_its_place(space.candidates, sets, few, i)[1] >= NAMED)
-    return sure, settings if sure == best else space.settled(sure, settings)[1]
+    sure = tuple(i for i in few if in_its_place(space.candidates, sets, few, i)[1] >= settings.NAMED)
+    return sure, hyper if sure == best else space.settled(sure, hyper)[1]
 
 
 def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:
@@ -88,7 +86,7 @@ def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:
 
 
 def noise_left(
-    data: Data, extra: Sequence[Nuisances], space: Space, chosen: Sequence[int], settings: Settings
+    data: Data, extra: Sequence[Nuisances], space: Space, chosen: Sequence[int], hyper: Hyper
 ) -> Noise:
     """Noise that a set leaves, with errors of the instrument and the discrepancy beside it.
 
@@ -97,20 +95,20 @@ def noise_left(
         extra: Nuisance columns, one per recording.
         space: Gram matrices.
         chosen: The set.
-        settings: Sizes and levels beside it.
+        hyper: Sizes and levels beside it.
     """
-    mean, cov = space.posterior(chosen, settings)
+    mean, cov = space.posterior(chosen, hyper)
     columns, n = space.set_columns(chosen), len(space.joints)
     amplitudes = columns[space.offset :] - space.offset + data.nuisances
     at = np.r_[0 : data.nuisances, amplitudes]
     w = np.r_[mean[: data.nuisances], mean[space.offset :]] * data.scale[at]
     common = mean[data.nuisances : space.offset]
-    own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(settings)]
+    own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(hyper)]
     residuals = []
     for s, e in zip(data.stretches, extra, strict=True):
         r = s.y - s.of(at) @ w - e.common @ common
         residuals.append(r - np.stack([x @ v for x, v in zip(e.own, own, strict=True)], axis=1))
-    known = np.diag(cov) / space.prior(chosen, settings) ** 2
+    known = np.diag(cov) / space.prior(chosen, hyper) ** 2
     shared = (len(mean) - float(known.sum())) / n  # shrunk ones count for less; they are split over the joints
-    dof = np.array([g.at(s).dof() for g, s in zip(space.joints, settings, strict=True)]) + shared
+    dof = np.array([g.at(s).dof() for g, s in zip(space.joints, hyper, strict=True)]) + shared
     return noise_from_residuals(residuals, [s.use for s in data.stretches], dof, [s.unsure for s in data.stretches])

@@ -3,15 +3,12 @@
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
 from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gram import JointGram
 from irb140_jax.mismatch.selection.evidence import Space
 from irb140_jax.mismatch.selection.kinds import kinds_of
-
-RARE = 0.05  # expected number of sites of a robot at which an effect that few machines have is left out
-COMMON = 0.5  # probability of ordinary friction at a joint
-EVENT = 0.2  # s before what happens once, or after it, that must be recorded
 
 
 def space_of(
@@ -49,7 +46,7 @@ def space_of(
             weights[i, :k], least[i] = s, c.lowest[0]
     return Space(
         joints, candidates, data.nuisances, data.nuisances + common, len(data.scale) + common,
-        log_prior(data, lib, first), kinds_of(candidates, RARE), lowest, highest, weights, least,
+        log_prior(data, lib, first), kinds_of(candidates, settings.RARE), lowest, highest, weights, least,
     )  # fmt: skip
 
 
@@ -73,7 +70,7 @@ def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
             return float(prior - np.log(2.0 * np.sum((least <= middle) & (middle < most))))
         return float(prior - np.log(len(alike))) + narrowed.get((c.slug, c.joints), 0.0)
 
-    usual = np.log(COMMON / (1.0 - COMMON))
+    usual = np.log(settings.COMMON / (1.0 - settings.COMMON))
     return np.array([usual if c.effect.prior.ordinary else rare(c) for c in data.candidates])
 
 
@@ -98,4 +95,4 @@ def _throughout(data: Data, c: Candidate) -> bool:
     recording, begins, ends = c.effect.shapes.during(c.shape)
     seen = [s.t[np.any(s.use, axis=1)] - s.begin for s in data.stretches if s.recording == recording]
     t = np.concatenate([*seen, np.zeros(0)])
-    return len(t) == 0 or (begins < t[0] + EVENT and ends > t[-1] - EVENT)
+    return len(t) == 0 or (begins < t[0] + settings.EVENT_MARGIN and ends > t[-1] - settings.EVENT_MARGIN)

@@ -4,14 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from irb140_jax.mismatch.regression.assemble import BLOCKS
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.gaussian import Posterior, grams, posterior
 from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals
-from irb140_jax.mismatch.regression.nuisances import GAIN_COMMON
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 
-ALONE = 0.8  # share of a joint's usable rows, or of a finding's torque, without which nothing is known of it
 SETTLED = 2  # rounds in which the noise and what leaves it agree
 
 
@@ -83,17 +81,17 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     out, weight = [], np.vstack([np.stack([g.rows for g in ex.by_block.joints]), _energy(ex, ex.chosen)])
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
     of_recording = np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches])
-    motion, number = of_recording[recording], np.tile(np.arange(BLOCKS), len(ex.data.stretches))
+    motion, number = of_recording[recording], np.tile(np.arange(settings.BLOCKS), len(ex.data.stretches))
     for m in dict.fromkeys(motion.tolist()):
         mine = motion == m
-        alone = np.max(weight[:, mine].sum(axis=1)) > ALONE
+        alone = np.max(weight[:, mine].sum(axis=1)) > settings.ALONE
         out += [mine & (number == k) for k in np.unique(number[mine])] if alone else [mine]
     return out
 
 
 def recordings_of_blocks(ex: Explanation) -> np.ndarray:
     """Recording of each block, shape (blocks,)."""
-    return np.repeat([s.recording for s in ex.data.stretches], BLOCKS)
+    return np.repeat([s.recording for s in ex.data.stretches], settings.BLOCKS)
 
 
 def _energy(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:
@@ -144,9 +142,9 @@ def refitted(ex: Explanation) -> Refit:
     columns = ex.columns(loose)
     stretches = [s.of_rigid_body() for s in ex.data.stretches]
     scale, prior = ex.data.scale[columns], np.ones(len(columns))
-    prior[: ex.data.nuisances] = ex.space.width(ex.chosen, ex.settings)
+    prior[: ex.data.nuisances] = ex.space.width(ex.chosen, ex.hyper)
     noise = _noise_left(stretches, columns, scale, prior, ex.noise)
-    return Refit(ex, loose, grams(stretches, columns, noise, scale, BLOCKS), prior)
+    return Refit(ex, loose, grams(stretches, columns, noise, scale, settings.BLOCKS), prior)
 
 
 def _noise_left(
@@ -170,7 +168,7 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     bare = [s.of_rigid_body() for s in data.stretches]
     out = {"refit": [s.y.copy() for s in bare], "named": [s.y.copy() for s in data.stretches]}
     out["flexible"], out["left"] = ([s.y.copy() for s in data.stretches] for _ in range(2))
-    gains, fits = {"flexible": np.zeros(len(ex.settings)), "left": np.zeros(len(ex.settings))}, []
+    gains, fits = {"flexible": np.zeros(len(ex.hyper)), "left": np.zeros(len(ex.hyper))}, []
     for fold in folds(ex):
         post, scale, own = ex.prediction(fold)
         post = dataclasses.replace(post, mean=np.where(_only_here(ex, ex.chosen, energy, fold), seen, post.mean))
@@ -189,7 +187,7 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
                 rows = slice(edges[b], edges[b + 1])
                 out["refit"][r][rows] -= rigid[rows] @ inertial
                 out["named"][r][rows] -= named[rows] @ corrected
-                out["named"][r][rows] -= scale / GAIN_COMMON * ex.extra[r].common[rows, :, 0]
+                out["named"][r][rows] -= scale / settings.GAIN_COMMON * ex.extra[r].common[rows, :, 0]
                 out["left"][r][rows] -= named[rows] @ erring + ex.extra[r].common[rows] @ common
                 out["left"][r][rows] -= np.stack(
                     [x[rows] @ v for x, v in zip(ex.extra[r].own, errors, strict=True)], axis=1
@@ -237,6 +235,6 @@ def _unseen_error(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.nd
 def _only_here(ex: Explanation, chosen: tuple[int, ...], energy: np.ndarray, fold: np.ndarray) -> np.ndarray:
     """Columns of members that only this fold can tell of: they happen once, or nearly all of their torque is in it."""
     members = [ex.data.candidates[i] for i in chosen]
-    alone = energy[:, fold].sum(axis=1) > ALONE * energy.sum(axis=1)
+    alone = energy[:, fold].sum(axis=1) > settings.ALONE * energy.sum(axis=1)
     each = [np.full(len(c.columns), c.effect.shapes.once or a) for c, a in zip(members, alone, strict=True)]
     return np.concatenate([np.zeros(ex.data.nuisances, dtype=bool), *each])

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.effects.grids import nearest_in_each_direction
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.scout import left_over
 from irb140_jax.mismatch.result import Estimate
@@ -15,7 +16,6 @@ from irb140_jax.robot import Robot
 NEIGHBOURS = 12  # shapes around the named one that tell how finely its grid resolves each parameter
 SMALL = 1e-6  # of an amplitude's prior: step of a slope
 FAR = 1e5  # steps of the grid: prior standard deviation of a shape where nothing is known of it
-UNSEEN = 3.0  # a direction taken at random has six times as much of what isn't seen in one case of ten
 
 
 def parameters_of(
@@ -84,7 +84,7 @@ def _of_all_columns(ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray)
     spread[np.ix_(used, used)] = cov
     unseen = scale == 0.0
     if c.effect.prior.vector and unseen.any() and not unseen.all():
-        spread[unseen, unseen] = UNSEEN**2 * np.mean(full[~unseen] ** 2)
+        spread[unseen, unseen] = settings.UNSEEN**2 * np.mean(full[~unseen] ** 2)
     return full, spread
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 from irb140_jax.effects import Effect, Scales
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import columns_along, prepared, unbounded, without
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.mismatch.regression.gaussian import eliminated
@@ -19,10 +20,6 @@ from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.excite import Excitation, fourier_motion, within
 from irb140_jax.robot import Robot
-
-REFERENCE_SHARE = 0.06  # an effect of this share of the joint's torque along a lively motion should be seen ...
-VISIBLE = 5.0  # ... with this many standard deviations, or the motion can't test it
-LIVELY = {"duration": 10.0, "speed": 0.6, "seed": 1}  # the reference motion: 60 % of the speed limits
 
 
 class AtSite(Protocol):
@@ -35,8 +32,6 @@ class AtSite(Protocol):
     def joints(self) -> tuple[int, ...]: ...  # noqa: D102
 
 
-ROUNDED = 3.0  # times the speed of rest: from there sign(qd) is right to half a percent
-LEAK = 0.1  # [s] over which the low-pass spreads what happens at a reversal
 Site = tuple[str, tuple[int, ...]]
 Seen = dict[Site, tuple[float, int]]  # standard deviations by which an effect stands out, and its candidate
 
@@ -69,7 +64,7 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
         rate: Of the samples [1/s].
     """
     robot = within(lib.robot, scales.low, scales.high)
-    motion = played(fourier_motion(robot, rate=rate, **LIVELY), scales.rest_speed)
+    motion = played(fourier_motion(robot, rate=rate, **settings.LIVELY), scales.rest_speed)
     along = prepared(lib.robot, motion)
     effects = columns_along(lib, along)
     effects = without(lib, effects, unbounded(lib, effects))
@@ -87,7 +82,7 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
                 columns = first + k * width + np.asarray(part)
                 power = np.mean(lib.torque(effects, columns, np.asarray(likely)) ** 2, axis=0).sum()
                 if power > 0.0:
-                    amplitudes[columns] = np.asarray(likely) * REFERENCE_SHARE * np.linalg.norm(torque[joints])
+                    amplitudes[columns] = np.asarray(likely) * settings.REFERENCE_SHARE * np.linalg.norm(torque[joints])
                     amplitudes[columns] /= np.sqrt(power)
                     most = bounds[k // shapes.shape[1]][part]
                     amplitudes[columns] *= np.min(np.minimum(most / np.maximum(amplitudes[columns], 1e-300), 1.0))
@@ -99,8 +94,8 @@ def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
 
     Laws that agree but for that rounding would seem to differ there.
     """
-    rounded = np.abs(motion.qd) < ROUNDED * rest_speed
-    around = 2 * int(np.ceil(LEAK / (motion.t[1] - motion.t[0]))) + 1
+    rounded = np.abs(motion.qd) < settings.REST_ROUNDED * rest_speed
+    around = 2 * int(np.ceil(settings.LEAK / (motion.t[1] - motion.t[0]))) + 1
     usable = ~ndimage.maximum_filter1d(rounded.astype(np.uint8), around, axis=0).astype(bool)
     direction, torque = np.tanh(motion.qd / rest_speed), np.zeros_like(motion.q)
     moving = (motion.name, motion.t, motion.q, motion.qd, motion.qdd, torque, usable)
@@ -170,7 +165,7 @@ def not_testable(
     needs = {effect.slug: effect.needs for effect in effects}
     blind: dict[str, set[int]] = {}
     for (slug, joints), (z, _) in seen.items():
-        if z < VISIBLE and slug not in found:
+        if z < settings.VISIBLE and slug not in found:
             blind.setdefault(slug, set()).update(joints)
     return tuple(
         NotTestable(slug, tuple(robot.joint_names[j] for j in sorted(joints)), f"Needs {needs[slug]}.")

@@ -4,14 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
-
-SECONDS = 3.0  # of motion that a joint must show: less is a few reversals, which any law fits
-LARGE = 0.5  # of a joint's torque: an error this large may hide anything
-ABOVE_NOISE = 3.0  # times the sensors' scatter: an error this large is no noise ...
-NOT_SMALL = 0.1  # ... and leaves a joint undecided where it is more than this share of the joint's torque
 
 
 def torque_size(proof: HeldOut, torque: Sequence[np.ndarray]) -> np.ndarray:
@@ -40,17 +36,17 @@ def undecidable(
     out = {}
     for j in np.flatnonzero(proof.judged):
         name, unit = robot.joint_names[j], "N" if robot.is_slide[j] else "N m"
-        if seconds[j] < SECONDS:
+        if seconds[j] < settings.FEWEST_SECONDS:
             out[int(j)] = (
-                f"{name} moves for only {seconds[j]:.2g} s: record at least {SECONDS:g} s in which it moves, better "
-                "20 s with a dozen reversals"
+                f"{name} moves for only {seconds[j]:.2g} s: record at least {settings.FEWEST_SECONDS:g} s in which it "
+                "moves, better 20 s with a dozen reversals"
             )
-        elif left[j] > LARGE * size[j]:
+        elif left[j] > settings.LARGE_ERROR * size[j]:
             out[int(j)] = (
                 f"the remaining error of {name}, {left[j]:.3g} {unit}, is {100 * left[j] / max(size[j], 1e-300):.0f} % "
                 "of its torque and may hide anything: check its columns and units, and record faster or longer motion"
             )
-        elif left[j] > max(NOT_SMALL * size[j], ABOVE_NOISE * scatter[j]):
+        elif left[j] > max(settings.NOT_SMALL * size[j], settings.ABOVE_NOISE * scatter[j]):
             times, share = left[j] / max(scatter[j], 1e-300), 100 * left[j] / max(size[j], 1e-300)
             out[int(j)] = (
                 f"the remaining error of {name}, {left[j]:.3g} {unit}, is {times:.2g} times the noise of the sensors "

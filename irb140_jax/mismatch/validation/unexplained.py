@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.noise import spread
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
@@ -20,9 +21,6 @@ MOST_ROWS = 20_000  # of a joint: of more, every second, third ... is taken; a l
 FEATURES = 60  # random Fourier features a competitor
 WAVES = 50  # along a joint's range, of the competitor that knows position and direction
 SHIFTS = 99  # circular time shifts that make the null
-MATERIAL_SHARE = 0.05  # of the remaining residual's variance; less is not worth a person's time
-MATERIAL_TORQUE = 0.02  # of the joint's torque RMS; below, what smoothing and imperfect laws leave
-SIGNIFICANT = 0.01
 SEED = 20260
 SLOWEST, FASTEST = 0.3, 8.0  # Hz: oscillators that the competitor with a memory may hold
 OSCILLATORS = 12
@@ -32,7 +30,6 @@ RIDGES = (0.003, 0.03, 0.3, 3.0, 30.0)  # of the features' variance; the best on
 TIME_BAND = 1.0  # Hz up to which the competitor of time follows
 MOST_COSINES = 600  # of a recording: along one of more than five minutes they follow no faster than these do
 TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
-NEARLY = 2.0 / 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,7 +94,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
     rmse = proof.rmse(proof.left)
     for j in range(len(torque)):
         rows = _rows(ex, proof, j)
-        least = max(MATERIAL_SHARE, (MATERIAL_TORQUE * torque[j] / max(rmse[j], 1e-100)) ** 2)
+        least = max(settings.MATERIAL_SHARE, (settings.MATERIAL_TORQUE * torque[j] / max(rmse[j], 1e-100)) ** 2)
         # No share of so small a residual could matter.
         if len(rows.residual) < 200 or least > 1.0:
             continue
@@ -111,7 +108,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
         for best in dict.fromkeys((_carrier(rivals, shares), int(np.argmax(shares)))):
             share = float(shares[best])
             p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
-            if share >= least and p <= SIGNIFICANT:
+            if share >= least and p <= settings.SIGNIFICANT:
                 size = float(np.sqrt(share) * rmse[j])
                 out.append(Structure(j, share, p, rivals[best].variable, size))
                 break
@@ -121,7 +118,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
 def _carrier(rivals: list[Competitor], shares: np.ndarray) -> int:
     """The best competitor; time only where motion does not do nearly as well, for whatever is slow goes with time."""
     motion = np.where([c.shifts for c in rivals], shares, -np.inf)
-    return int(np.argmax(motion if motion.max() > NEARLY * shares.max() else shares))
+    return int(np.argmax(motion if motion.max() > settings.NEARLY * shares.max() else shares))
 
 
 def competitors(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
