@@ -106,7 +106,7 @@ def page(results: list[dict[str, Any]]) -> str:
     lines = [
         "# What the settings decide", "",
         "Written by `experiments/settings_swept.py` from `results/settings_swept.jsonl`; don't edit.", "",
-        f"Every number of `irb140_jax/mismatch/settings.py` that can change a name, multiplied and divided by {FACTOR},",
+        f"Every number of `irb140_jax/mismatch/settings.py` that can change a name, multiplied and divided by {FACTOR}",
         f"on cases 0 to {max(usual, default=0)} of the testbed's draw *work*, {every} names in all. + and - are names",
         "that come and go; a name that goes may still be listed as an alternative.", "",
         "| setting | value | x 1.5 | / 1.5 |", "|---|---|---|---|",
