@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from irb140_jax.effects import Effect
+from irb140_jax.effects import Effect, Scales
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Loads, Prepared, all_prepared, columns_along, scales_of, seen_by
 from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, reshaped
@@ -57,63 +57,111 @@ def explain(
         sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         progress: Told what is being done.
     """
-    factor = inertial_prior_factor(robot, 1.0)
     progress("rigid body along the recordings")
-    along = all_prepared(robot, recordings)
+    along, factor = all_prepared(robot, recordings), inertial_prior_factor(robot, 1.0)
     scales = scales_of(along)
-    lib = first = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
-    loads: list[Loads | None] = [None] * len(recordings)
+    first = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
+    given = _Given(first, scales, band, factor, uncertainty, sensors, progress)
+    start, unsettled = _Start(1, first, along, [None] * len(along)), True
+    while start.round < PASSES or (unsettled and start.round < MOST_PASSES):
+        ex = _explained(given, start)
+        start, unsettled = _next(given, start, ex)
+        del ex  # hundreds of megabytes, before the next
+    return _explained(given, start, last=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Given:
+    """What is the same in all rounds: arguments of `explain`, and what follows from them.
+
+    Attributes:
+        first: The library before its shapes were refined.
+        scales: Sizes of the recordings.
+        band, uncertainty, sensors, progress: See `explain`.
+        factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
+    """
+
+    first: Library
+    scales: Scales
+    band: Band
+    factor: np.ndarray
+    uncertainty: float
+    sensors: np.ndarray
+    progress: Callable[[str], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Start:
+    """What a round starts from: what the round before found.
+
+    Attributes:
+        round: Its number, from 1.
+        lib: The library with shapes as fine as they are so far.
+        along: The recordings as effects see them.
+        loads: Of the last explanation along each; of the nominal model where None.
+        at: Where the regression is linearised; at the nominal model where None.
+        chosen: The set with which the search starts.
+        noise: What the last explanation leaves.
+    """
+
+    round: int
+    lib: Library
+    along: list[Prepared]
+    loads: Sequence[Loads | None]
     at: Point | None = None
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
 
-    def explained(at: Point | None, turn: int, *, last: bool = False) -> Explanation:
-        progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
-        each = [*zip(along, loads, strict=True)]
-        rows = judged([bare_stretch(lib, r, i, band, factor, load, at) for i, (r, load) in enumerate(each)])
-        known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in each]
-        extra = nuisances(robot, along, known, band, scales)
-        whitening = noise or _first_noise(lib, rows, along, band, uncertainty, extra)
-        columns = [partial(candidate_rows, lib, r, i, band, load, at) for i, (r, load) in enumerate(each)]
-        sums = summed(lib, rows, columns, extra, whitening)
-        if at and not sums.finite:
-            return explained(None, turn, last=last)  # an explanation without bounds is nothing to start from
-        data = Data(rows, prior_scale(lib, rows, uncertainty, sums.power), with_loose_inertials(lib), len(factor))
-        progress(f"searching sets of explanations (round {turn})")
-        joints = joint_grams(sums, lib, data, extra, whitening, sensors)
-        del sums  # hundreds of megabytes, before the search
-        space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
-        # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
-        best, hyper, sets = selected(space, chosen, every_move=turn == 1 or last)
-        if at and not at.rests_on <= {site_of(data.candidates[i]) for i in best}:
-            # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
-            return explained(None, turn, last=last)
-        best, hyper = named(space, best, hyper, sets) if last else (best, hyper)
-        for joint in joints:
-            joint.forget()
-        members = [data.candidates[i] for i in best]
-        held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
-        data = dataclasses.replace(data, stretches=held)
-        ex = Explanation(lib, scales, data, extra, whitening, space, space, best, hyper, sets, factor)
-        return _by_block(ex, sensors) if last else ex
 
-    turn, coarse, off = 1, False, False
-    while turn < PASSES or ((coarse or off) and turn < MOST_PASSES):
-        ex = explained(at, turn)
-        found = fitted(ex.data, ex.posterior(), ex.chosen, factor)
-        physics = _physics(found)
-        better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
-        along, at = [seen_by(better, r) for r in along], point(robot, found[0], physics)
-        torques = [_torques(robot, physics, found[0], r, i) for i, r in enumerate(along)]
-        loads = [t.loads for t in torques]
-        off = _off(ex, torques, band)
-        noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
-        coarse = _coarse(ex, noise)
-        # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
-        lib, chosen = _refined(_without_discrepancy(ex) if turn == 1 or coarse else ex)
-        turn += 1
-        del ex  # hundreds of megabytes, before the next
-    return explained(at, turn, last=True)
+def _explained(given: _Given, start: _Start, *, last: bool = False) -> Explanation:
+    """One round: columns, sums over all rows, search, and the columns of what was found; of the last, what is named."""
+    lib, at, band, n = start.lib, start.at, given.band, start.round
+    given.progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {n})")
+    each = [*zip(start.along, start.loads, strict=True)]
+    rows = judged([bare_stretch(lib, r, i, band, given.factor, load, at) for i, (r, load) in enumerate(each)])
+    known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in each]
+    extra = nuisances(lib.robot, start.along, known, band, given.scales)
+    noise = start.noise or _first_noise(lib, rows, start.along, band, given.uncertainty, extra)
+    columns = [partial(candidate_rows, lib, r, i, band, load, at) for i, (r, load) in enumerate(each)]
+    sums = summed(lib, rows, columns, extra, noise)
+    if at and not sums.finite:
+        # An explanation without bounds is nothing to start from.
+        return _explained(given, dataclasses.replace(start, at=None), last=last)
+    scale = prior_scale(lib, rows, given.uncertainty, sums.power)
+    data = Data(rows, scale, with_loose_inertials(lib), len(given.factor))
+    given.progress(f"searching sets of explanations (round {n})")
+    joints = joint_grams(sums, lib, data, extra, noise, given.sensors)
+    del sums  # hundreds of megabytes, before the search
+    space = space_of(joints, data, extra[0].common.shape[-1], lib, given.first, settled=n > 1)
+    # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
+    best, hyper, sets = selected(space, start.chosen, every_move=n == 1 or last)
+    if at and not at.rests_on <= {site_of(data.candidates[i]) for i in best}:
+        # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
+        return _explained(given, dataclasses.replace(start, at=None), last=last)
+    best, hyper = named(space, best, hyper, sets) if last else (best, hyper)
+    for joint in joints:
+        joint.forget()
+    members = [data.candidates[i] for i in best]
+    held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
+    data = dataclasses.replace(data, stretches=held)
+    ex = Explanation(lib, given.scales, data, extra, noise, space, space, best, hyper, sets, given.factor)
+    return _by_block(ex, given.sensors) if last else ex
+
+
+def _next(given: _Given, start: _Start, ex: Explanation) -> tuple[_Start, bool]:
+    """What the next round starts from, and whether this one is not settled: too coarse, or off its linearisation."""
+    robot, found = ex.lib.robot, fitted(ex.data, ex.posterior(), ex.chosen, given.factor)
+    physics = _physics(found)
+    better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
+    along = [seen_by(better, r) for r in start.along]
+    torques = [_torques(robot, physics, found[0], r, i) for i, r in enumerate(along)]
+    noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
+    coarse = _coarse(ex, noise)
+    # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
+    lib, chosen = _refined(_without_discrepancy(ex) if start.round == 1 or coarse else ex)
+    at, loads = point(robot, found[0], physics), [t.loads for t in torques]
+    after = _Start(start.round + 1, lib, along, loads, at, chosen, noise)
+    return after, coarse or _off(ex, torques, given.band)
 
 
 def _first_noise(
