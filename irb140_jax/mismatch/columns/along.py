@@ -237,10 +237,12 @@ def columns_along(
         near_rest = r.rest_speed, _padded(r.direction[piece], pad), np.array(float(recording))
         motion = Motion(*moving, rigid, *near_rest)  # pyright: ignore[reportArgumentType, reportCallIssue]: NumPy
         motion = dataclasses.replace(motion, turned=turned_before(r.q, turns, start, TURNS))
-        # One program for each effect: of all in one, XLA would evaluate parts again and again.
-        effects = [np.zeros((CHUNK, 0)), *(_columns(b[0], b[1], b[2], motion) for b in lib.blocks)]
         begin, end = max(start + RUN_IN if start else 0, first), min(start + CHUNK - RUN_OUT, last)
-        out[begin - first : end - first] = np.concatenate(effects, axis=1)[begin - start : end - start]
+        # One program for each effect: of all in one, XLA would evaluate parts again and again.
+        effects, column = [_columns(b[0], b[1], b[2], motion) for b in lib.blocks], 0
+        for part in map(np.asarray, effects):
+            out[begin - first : end - first, column : column + part.shape[1]] = part[begin - start : end - start]
+            column += part.shape[1]
     return out
 
 
