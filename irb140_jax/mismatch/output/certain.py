@@ -25,7 +25,7 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
     """
     c = ex.data.candidates[index]
     columns = ex.data.nuisances + c.columns
-    torque = [s.of(columns) @ w for s in ex.data.stretches]
+    torque = [s.torque(columns, w) for s in ex.data.stretches]
     use = [s.use for s in ex.data.stretches]
     power = np.array([sum(np.sum(x[u[:, j], j] ** 2) for x, u in zip(torque, use, strict=True))
                       for j in range(robot.n)])  # fmt: skip

@@ -31,7 +31,7 @@ def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
     kept = []
     for index, rows in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
         c = ex.data.candidates[index]
-        torque = [s.of(ex.data.nuisances + c.columns) @ w[rows] for s in ex.data.stretches]
+        torque = [s.torque(ex.data.nuisances + c.columns, w[rows]) for s in ex.data.stretches]
         if c.slug == "inertials" or np.any(_rms(torque, ex) > INEXACT * logged):
             kept.append(index)
     return dataclasses.replace(ex, chosen=tuple(kept))

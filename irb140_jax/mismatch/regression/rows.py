@@ -77,6 +77,15 @@ class Stretch:
         out[..., ~links] = amplitudes[..., np.searchsorted(self.held, columns[~links] - k)]
         return out
 
+    def torque(self, columns: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """What some columns add up to with amplitudes w, shape (R, n)."""
+        k = self.inertials.shape[-1]
+        columns = np.where(columns < k + self.size, columns, columns - k - self.size)
+        links, weights = columns < k, (np.zeros(k), np.zeros(len(self.held)))
+        np.add.at(weights[0], columns[links], w[links])
+        np.add.at(weights[1], np.searchsorted(self.held, columns[~links] - k), w[~links])
+        return self.inertials @ weights[0] + self.amplitudes @ weights[1]
+
     def of_rigid_body(self) -> "Stretch":
         """With inertials alone, as they are without any explanation."""
         return dataclasses.replace(self.holding(), inertials=self.rigid, y=self.tau - self.nominal)

@@ -205,7 +205,7 @@ def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
     w = post.mean * ex.data.scale[post.columns]
     square = np.zeros(len(ex.hyper))
     for s, t in zip(ex.data.stretches, torques, strict=True):
-        linear = s.tau - s.y + s.of(post.columns) @ w
+        linear = s.tau - s.y + s.torque(post.columns, w)
         square += np.sum(np.where(s.use, band.apply(t.corrected) - linear, 0.0) ** 2, axis=0)
     rows = np.maximum(sum(s.use.sum(axis=0) for s in ex.data.stretches), 1)
     return bool(np.any(np.sqrt(square / rows) > ex.level))

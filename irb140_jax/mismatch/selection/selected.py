@@ -106,7 +106,7 @@ def noise_left(
     own = [space.own(j, s, columns, mean, instrument=True) for j, s in enumerate(hyper)]
     residuals = []
     for s, e in zip(data.stretches, extra, strict=True):
-        r = s.y - s.of(at) @ w - e.common @ common
+        r = s.y - s.torque(at, w) - e.common @ common
         residuals.append(r - np.stack([x @ v for x, v in zip(e.own, own, strict=True)], axis=1))
     known = np.diag(cov) / space.prior(chosen, hyper) ** 2
     shared = (len(mean) - float(known.sum())) / n  # shrunk ones count for less; they are split over the joints

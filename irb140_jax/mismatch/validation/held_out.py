@@ -7,6 +7,7 @@ import numpy as np
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.gaussian import Posterior, grams, posterior
 from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals
+from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 
@@ -154,7 +155,7 @@ def _noise_left(
     every, n = np.arange(len(scale)), stretches[0].y.shape[1]
     for _ in range(SETTLED):
         post = posterior(grams(stretches, columns, noise, scale, 1).sum(axis=0), every, prior=prior)
-        residuals = [s.y - s.of(columns) @ (post.mean * scale) for s in stretches]
+        residuals = [s.y - s.torque(columns, post.mean * scale) for s in stretches]
         # Effective parameters: shrunk ones count for less; shared ones are split over the joints.
         dof = np.full(n, (len(scale) - float(np.sum(np.diag(post.cov) / prior**2))) / n)
         noise = noise_from_residuals(residuals, [s.use for s in stretches], dof, [s.unsure for s in stretches])
@@ -181,22 +182,20 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
             mine = fold[recording == s.recording]
             if not mine.any():
                 continue
-            named, rigid = s.of(post.columns), bare[r].of(refit.columns)
             edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
-            for b in np.flatnonzero(mine):
-                rows = slice(edges[b], edges[b + 1])
-                out["refit"][r][rows] -= rigid[rows] @ inertial
-                out["named"][r][rows] -= named[rows] @ corrected
-                out["named"][r][rows] -= scale / settings.GAIN_COMMON * ex.extra[r].common[rows, :, 0]
-                out["left"][r][rows] -= named[rows] @ erring + ex.extra[r].common[rows] @ common
-                out["left"][r][rows] -= np.stack(
-                    [x[rows] @ v for x, v in zip(ex.extra[r].own, errors, strict=True)], axis=1
-                )
-                delta = np.stack([x[rows] @ v for x, v in zip(ex.extra[r].own, own, strict=True)], axis=1)
-                out["flexible"][r][rows] = out["named"][r][rows] - delta
-                for which, gain in gains.items():
-                    old, new = (np.where(s.use[rows], out[k][r][rows], 0.0) for k in ("named", which))
-                    gain += np.sum(old**2 - new**2, axis=0)
+            rows, extra, rigid = np.repeat(mine, np.diff(edges)), ex.extra[r], bare[r]
+            named = s.y - s.torque(post.columns, corrected) - scale / settings.GAIN_COMMON * extra.common[..., 0]
+            unseen = {
+                "refit": rigid.y - rigid.torque(refit.columns, inertial),
+                "named": named,
+                "flexible": named - _of_own(extra, own),
+                "left": s.y - s.torque(post.columns, erring) - extra.common @ common - _of_own(extra, errors),
+            }
+            for which, x in unseen.items():
+                out[which][r][rows] = x[rows]
+            for which, gain in gains.items():
+                old, new = (np.where(s.use, unseen[k], 0.0)[rows] for k in ("named", which))
+                gain += np.sum(old**2 - new**2, axis=0)
     nominal, use = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches]
     carried, left = (
         [np.where(gains[k] > 0.0, better, named) for better, named in zip(out[k], out["named"], strict=True)]
@@ -205,6 +204,11 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     return HeldOut(
         nominal, out["refit"], out["named"], left, carried, use, gains["flexible"] > 0.0, tuple(fits)
     )
+
+
+def _of_own(extra: Nuisances, w: list[np.ndarray]) -> np.ndarray:
+    """Torque of each joint's own columns, shape (R, n)."""
+    return np.stack([x @ v for x, v in zip(extra.own, w, strict=True)], axis=1)
 
 
 def held_out_gains(ex: Explanation) -> dict[int, float]:
