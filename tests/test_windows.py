@@ -14,10 +14,11 @@ from irb140_jax.mismatch.columns.candidates import library
 from irb140_jax.mismatch.diagnose import diagnose
 from irb140_jax.mismatch.regression import rows
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
-from irb140_jax.mismatch.regression.gram import grams_by_block, joint_grams, summed
+from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
 from irb140_jax.mismatch.regression.noise import ORDER, Noise
 from irb140_jax.mismatch.regression.nuisances import nuisances
 from irb140_jax.mismatch.regression.rows import bare_stretch, candidate_rows, stretch
+from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import point
 
 ALONG = prepared(ROBOT, SMOOTH)

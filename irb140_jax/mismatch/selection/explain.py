@@ -13,7 +13,7 @@ from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, 
 from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, composed, library_of
 from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
-from irb140_jax.mismatch.regression.gram import grams_by_block, joint_grams, summed
+from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
 from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.regression.nuisances import Nuisances, nuisances
 from irb140_jax.mismatch.regression.rows import (
@@ -24,6 +24,7 @@ from irb140_jax.mismatch.regression.rows import (
     with_library,
 )
 from irb140_jax.mismatch.regression.scout import left_over, scouted, suggested
+from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
 from irb140_jax.mismatch.selection.averages import site_of
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted, parts
