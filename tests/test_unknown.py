@@ -1,6 +1,5 @@
 """Physics in no library, made by MuJoCo: it is located by joint and by variables, and no name is forced upon it."""
 
-import dataclasses
 from types import SimpleNamespace
 from typing import Any
 
@@ -99,17 +98,3 @@ def test_what_the_teeth_of_a_gear_leave_goes_with_position_and_direction():
     shares = {c.variable: predicted(c, rows.residual[:, None])[0] for c in competitors([one], 0, rows, ("hinge",))}
     along = shares.pop("the joint's position and its direction of motion")
     assert along > 0.8 and max(shares.values()) < 0.5
-
-
-def test_friction_that_differs_between_recordings_is_noted_and_nothing_is_unexplained():
-    xml, share = random_robot(6, 2, slides=0.0), (1.6, 1.0, 1.25)
-    robot = robot_from_model(arm_spec(xml).compile(), source="random robot")
-    logs = []
-    for k, (times, motion) in enumerate(zip(share, three_motions(robot, 15.0, 500.0, seed=1), strict=True)):
-        rubbing = {"coulomb": 0.4 * times}
-        case = conceal(xml, [Concealment("coulomb_friction", ("joint1",), parameters=rubbing)], [motion], seed=4)
-        logs.append(dataclasses.replace(case.recordings[0], source=f"day {k}"))
-    diagnosis = diagnose(robot, logs).diagnosis
-    assert [(f.effect, f.joints) for f in diagnosis.findings] == [("coulomb_friction", ("joint1",))]
-    assert any(note.startswith("The friction of joint1 differs between the recordings") for note in diagnosis.notes)
-    assert diagnosis.unexplained == ()

@@ -5,10 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.regression.nuisances import SCALED
 from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.robot import Robot
+
+FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
 
 
 def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]:
@@ -75,15 +78,21 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
 def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
     """A note for every joint whose friction differs from recording to recording.
 
+    Said where friction of its own for each recording is more probable than one for all, against the odds of any rare
+    effect.
+
     Args:
         ex: The explanation.
         names: Of the recordings.
     """
     out = []
     _, _, own = ex.prediction()
-    for j in range(len(ex.hyper)):
-        levels = ex.friction_levels(j)
-        if ex.friction_differs(j):
+    for j, of_joint in enumerate(ex.hyper):
+        one_level = (*of_joint[:FRICTION_LEVELS], 0, *of_joint[FRICTION_LEVELS + 1 :])
+        alike = (*ex.hyper[:j], one_level, *ex.hyper[j + 1 :])
+        gain = ex.space.log_evidence(ex.chosen, ex.hyper) - ex.space.log_evidence(ex.chosen, alike)
+        levels = ex.extra[0].groups[j] == FRICTION_LEVELS
+        if levels.any() and gain > -np.log(settings.RARE):
             units = ("N", "N s/m") if ex.lib.robot.is_slide[j] else ("N m", "N m s/rad")
             dry, fast = (own[j] * ex.extra[0].units[j])[levels].reshape(2, -1)
             said = ", ".join(

@@ -13,11 +13,9 @@ from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gaussian import Posterior
 from irb140_jax.mismatch.regression.gram import LEVELS
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import SCALED, Nuisances
+from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
-
-FRICTION_LEVELS = SCALED.index("slope")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,21 +80,6 @@ class Explanation:
             known = self.sets.get(frozenset(other))
             value = max(value, self.space.settled(other, self.hyper, joints)[0] if known is None else known)
         return value
-
-    def friction_differs(self, joint: int) -> bool:
-        """Whether friction of its own for each recording is more probable at a joint than one for all.
-
-        Against the odds of any rare effect.
-        """
-        of_joint = self.hyper[joint]
-        one_level = (*of_joint[:FRICTION_LEVELS], 0, *of_joint[FRICTION_LEVELS + 1 :])
-        alike = (*self.hyper[:joint], one_level, *self.hyper[joint + 1 :])
-        gain = self.space.log_evidence(self.chosen, self.hyper) - self.space.log_evidence(self.chosen, alike)
-        return bool(self.friction_levels(joint).any()) and gain > -np.log(settings.RARE)
-
-    def friction_levels(self, joint: int) -> np.ndarray:
-        """Which of a joint's own columns are friction of each recording about the mean over all, shape (D,)."""
-        return self.extra[0].groups[joint] == FRICTION_LEVELS
 
     def gains(self, chosen: tuple[int, ...], which: Sequence[int]) -> np.ndarray:
         """Log posterior odds of adding each of some candidates to a set, -inf where inadmissible."""

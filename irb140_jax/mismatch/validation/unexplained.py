@@ -91,11 +91,10 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
     """Joints whose residual, findings taken off, can be predicted on unseen data."""
     out = []
     torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
+    rmse = proof.rmse(proof.left)
     for j in range(len(torque)):
-        left = _left(ex, proof, j)
-        rows = _rows(ex, left, j)
-        rmse = float(np.linalg.norm(rows.of(left)) / np.sqrt(max(len(rows.residual), 1)))
-        least = max(settings.MATERIAL_SHARE, (settings.MATERIAL_TORQUE * torque[j] / max(rmse, 1e-100)) ** 2)
+        rows = _rows(ex, proof, j)
+        least = max(settings.MATERIAL_SHARE, (settings.MATERIAL_TORQUE * torque[j] / max(rmse[j], 1e-100)) ** 2)
         # No share of so small a residual could matter.
         if len(rows.residual) < 200 or least > 1.0:
             continue
@@ -110,7 +109,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
             share = float(shares[best])
             p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
             if share >= least and p <= settings.SIGNIFICANT:
-                size = float(np.sqrt(share) * rmse)
+                size = float(np.sqrt(share) * rmse[j])
                 out.append(Structure(j, share, p, rivals[best].variable, size))
                 break
     return out
@@ -159,18 +158,7 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
     return [*out, _time(stretches, rows)]
 
 
-def _left(ex: Explanation, proof: HeldOut, j: int) -> list[np.ndarray]:
-    """What is left of a joint's rows, (R,) of each recording; without friction that is noted to differ between them."""
-    left = [x[:, j] for x in proof.left]
-    if not ex.friction_differs(j):
-        return left
-    levels = [e.own[j][:, ex.friction_levels(j)] for e in ex.extra]
-    used = [np.where(u[:, [j]], x, 0.0) for x, u in zip(levels, proof.use, strict=True)]
-    w = np.linalg.lstsq(np.concatenate(used), np.concatenate(left), rcond=1e-9)[0]
-    return [x - level @ w for x, level in zip(left, levels, strict=True)]
-
-
-def _rows(ex: Explanation, left: list[np.ndarray], j: int) -> Rows:
+def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
     """Only the level is divided out, not the colour: a slow structure is exactly what is looked for."""
     pick = [ex.noise.usable(s.use[:, j], j) for s in ex.data.stretches]
     thin = 1 + sum(int(p.sum()) for p in pick) // MOST_ROWS
@@ -180,7 +168,7 @@ def _rows(ex: Explanation, left: list[np.ndarray], j: int) -> Rows:
         for r, (s, p) in enumerate(zip(ex.data.stretches, pick, strict=True))
     ])  # fmt: skip
     recording = np.repeat(np.arange(len(pick)), [p.sum() for p in pick])
-    y = np.concatenate([x[p] for x, p in zip(left, pick, strict=True)]) / level
+    y = np.concatenate([c[p, j] for c, p in zip(proof.left, pick, strict=True)]) / level
     if len(y):
         limit = 6.0 * np.median(np.abs(y)) + 1e-12
         y = np.clip(y - np.mean(y), -limit, limit)
