@@ -116,8 +116,8 @@ class _Start:
 
 def _explained(given: _Given, start: _Start, *, last: bool = False) -> Explanation:
     """One round: columns, sums over all rows, search, and the columns of what was found; of the last, what is named."""
-    lib, at, band, n = start.lib, start.at, given.band, start.round
-    given.progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {n})")
+    lib, at, band, turn = start.lib, start.at, given.band, start.round
+    given.progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
     each = [*zip(start.along, start.loads, strict=True)]
     rows = judged([bare_stretch(lib, r, i, band, given.factor, load, at) for i, (r, load) in enumerate(each)])
     known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in each]
@@ -130,12 +130,12 @@ def _explained(given: _Given, start: _Start, *, last: bool = False) -> Explanati
         return _explained(given, dataclasses.replace(start, at=None), last=last)
     scale = prior_scale(lib, rows, given.uncertainty, sums.power)
     data = Data(rows, scale, with_loose_inertials(lib), len(given.factor))
-    given.progress(f"searching sets of explanations (round {n})")
+    given.progress(f"searching sets of explanations (round {turn})")
     joints = joint_grams(sums, lib, data, extra, noise, given.sensors)
     del sums  # hundreds of megabytes, before the search
-    space = space_of(joints, data, extra[0].common.shape[-1], lib, given.first, settled=n > 1)
+    space = space_of(joints, data, extra[0].common.shape[-1], lib, given.first, settled=turn > 1)
     # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
-    best, hyper, sets = selected(space, start.chosen, every_move=n == 1 or last)
+    best, hyper, sets = selected(space, start.chosen, every_move=turn == 1 or last)
     if at and not at.rests_on <= {site_of(data.candidates[i]) for i in best}:
         # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
         return _explained(given, dataclasses.replace(start, at=None), last=last)
