@@ -20,7 +20,7 @@ import tyro
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.mismatch import diagnose, settings
 from testbed.cases import Variation, make
-from testbed.runner import _read
+from testbed.runner import read_case
 
 ROOT = pathlib.Path(__file__).parents[1]
 STORED, PAGE = ROOT / "results" / "settings_swept.jsonl", ROOT / "docs" / "settings.md"
@@ -38,9 +38,11 @@ class Config:
     """Which settings, and on how many cases."""
 
     cases: int = 6
-    """Cases 0 to this of *work*."""
+    """Of *work*: 0 to cases - 1."""
     part: int = 0
     of: int = 1
+    engine: str = ""
+    """Commit of the package, kept with each result."""
     page_only: bool = False
 
 
@@ -73,7 +75,7 @@ def _diagnose_all(config: Config) -> None:
     mine = [(name, f) for name in names()[config.part :: config.of] for f in (FACTOR, 1.0 / FACTOR)]
     mine = [("", 1.0), *mine] if config.part == 0 else mine
     with tempfile.TemporaryDirectory() as folder:
-        read = [_read(make("work", i, "", Variation(1.0, 1.0, None)), pathlib.Path(folder))[:2]
+        read = [read_case(make("work", i, "", Variation(1.0, 1.0, None)), pathlib.Path(folder))[:2]
                 for i in range(config.cases)]  # fmt: skip
     for name, factor in mine:
         usual = getattr(settings, name) if name else None
@@ -83,7 +85,7 @@ def _diagnose_all(config: Config) -> None:
             if (name, factor, i) not in done:
                 found = diagnose(robot, recordings).diagnosis
                 said = {
-                    "setting": name, "factor": factor, "case": i, "verdict": found.verdict,
+                    "engine": config.engine, "setting": name, "factor": factor, "case": i, "verdict": found.verdict,
                     "names": sorted(f"{f.effect} on {', '.join(f.joints)}" for f in found.findings),
                     "unexplained": sorted(j for u in found.unexplained for j in u.joints),
                 }  # fmt: skip
@@ -108,7 +110,8 @@ def page(results: list[dict[str, Any]]) -> str:
         "Written by `experiments/settings_swept.py` from `results/settings_swept.jsonl`; don't edit.", "",
         f"Every number of `irb140_jax/mismatch/settings.py` that can change a name, multiplied and divided by {FACTOR}",
         f"on cases 0 to {max(usual, default=0)} of the testbed's draw *work*, {every} names in all. + and - are names",
-        "that come and go; a name that goes may still be listed as an alternative.", "",
+        "that come and go; a name that goes may still be listed as an alternative. Probabilities and shares near one",
+        f"are moved by their odds. Engine at commit {', '.join(sorted({r['engine'] for r in results}))}.", "",
         "| setting | value | x 1.5 | / 1.5 |", "|---|---|---|---|",
     ]  # fmt: skip
     flips = 0
@@ -120,7 +123,7 @@ def page(results: list[dict[str, Any]]) -> str:
             flips += len(changes)
             cells.append("; ".join(changes) if changes else "nothing" if len(pairs) == len(usual) else "not run")
         lines.append(f"| `{name}` | {_value(getattr(settings, name))} | {cells[0]} | {cells[1]} |")
-    lines += ["", f"{flips} changes in all.", ""]
+    lines += ["", f"{flips} changes in {len(results) - len(usual)} diagnoses.", ""]
     return "\n".join(lines)
 
 

@@ -79,7 +79,7 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
     began = time.perf_counter()
     try:
         with tempfile.TemporaryDirectory() as folder:
-            robot, recordings, unseen = _read(case, pathlib.Path(folder))
+            robot, recordings, unseen = read_case(case, pathlib.Path(folder))
         result = (diagnose or mismatch.diagnose)(robot, recordings)
         out["seconds"] = time.perf_counter() - began
         out["diagnosis"] = {k: v for k, v in result.diagnosis.to_json().items() if k in KEPT}
@@ -92,7 +92,8 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
     return out
 
 
-def _read(case: Case, folder: pathlib.Path):
+def read_case(case: Case, folder: pathlib.Path):
+    """The robot, the recordings and those that nobody fits, written to a folder and read as a user's files are."""
     from irb140_jax.recordings import read_recording
     from irb140_jax.robot import load_robot
 

@@ -1,7 +1,8 @@
 """Every number that decides what a diagnosis says: its value, its unit and where it comes from.
 
-Numbers that change only how long a diagnosis takes, or by how little it is rounded, stand where they are used.
-`experiments/settings_swept.py` multiplies and divides these by 1.5 and writes down what changes (docs/settings.md).
+Where no source stands beside a number, it is a judgement.  Numbers that change only how long a diagnosis takes, or by
+how little it is rounded, stand where they are used.  `experiments/settings_swept.py` multiplies and divides these by
+1.5 and writes down what changes (docs/settings.md).
 """
 
 import numpy as np
@@ -47,7 +48,7 @@ DISCREPANCY_SIZES = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
 # Share of the torque that laws are usually wrong by: scale of the half-Cauchy prior of a size.  Careful identifications
 # of industrial arms leave a few per cent.
 USUAL_MISFIT = 0.03
-# Of a joint's range, over which bristles turn round: 0.1 to 10 mrad of a turn.
+# Of a joint's range, over which bristles turn round: of one radian, 0.2 to 12 mrad.
 BRISTLE_TRAVELS = (2e-4, 8e-4, 3e-3, 1.2e-2)
 # Of the top speed, over which friction nears its level.
 ROUNDED_SPEEDS = (0.003, 0.01, 0.03, 0.1)
@@ -86,8 +87,8 @@ NAMED = 0.9
 WITHIN = 15.0
 # Relative change of the noise from round to round below which shapes are fine enough.
 SETTLED_NOISE = 0.1
-# Times the standard deviation of the seen directions that what is not seen of a parameter may differ by: a direction
-# taken at random has six times as much of what isn't seen in one case of ten (decision 19).
+# Standard deviation of a vector's component that moves nothing here, over the size of those that do: a direction taken
+# at random has six times as much there in one case of ten (decision 19).
 UNSEEN = 3.0
 # [nats] by which refitted inertials must be more probable than the nominal ones: "decisive" in Jeffreys.
 CLEARLY_BETTER = float(np.log(100.0))
@@ -99,13 +100,13 @@ CLEARLY_BETTER = float(np.log(100.0))
 MATERIAL_SHARE, MATERIAL_TORQUE = 0.05, 0.02
 # Share of time-shifted copies that may be as predictable.
 SIGNIFICANT = 0.01
-# Share of the best competitor's that a simpler one must predict to be named in its place.
+# Share of what time predicts that a competitor which knows the motion must reach to be named instead.
 NEARLY = 2.0 / 3.0
 
 # --- What a motion could have shown --------------------------------------------------------------------------------
 
 # An effect of this share of the joint's torque along a lively motion should be seen with this many standard
-# deviations, or the motion can't test it.  Five are what physics calls an observation.
+# deviations, or the motion can't test it.  Five are the convention of particle physics for a discovery.
 REFERENCE_SHARE, VISIBLE = 0.06, 5.0
 # The lively motion: [s], share of the speed limits, seed.
 LIVELY = {"duration": 10.0, "speed": 0.6, "seed": 1}

@@ -26,7 +26,6 @@ RUN_IN = 512  # samples in which effects with memory forget how their chunk bega
 TURNS = 32  # turning points before a chunk, by which effects with memory of the path know how it began
 RUN_OUT = 32  # samples ahead that errors of a clock look at
 CHUNK = RUN_IN + 2048 + RUN_OUT  # samples per compiled call: recordings of any length reuse one program
-WINDOW = 4096  # samples whose regressor and sensitivities are held at a time
 KEPT = 50_000  # samples of all recordings, some minutes, up to which both are kept instead of evaluated anew: 250 MB
 # Three directions of gravity without a zero or a one, which would each be a program of its own.
 PULLS = np.array([[2.0, 3.0, 5.0], [5.0, 2.0, 3.0], [3.0, 5.0, 2.0]])  # m/s^2
@@ -76,7 +75,8 @@ class Prepared:
         recording: T samples.
         nominal: Torque of the nominal model [N m or N], shape (T, n).
         motor_side: What of it the links don't feel: rotors and the model's own friction, shape (T, n).
-        inertia: Mean of the mass matrix's diagonal, shape (n,).
+        inertia: Mean of the mass matrix's diagonal [kg m^2 or kg], shape (n,).
+        turns: Where each joint turns round; see `turning_points`.
         Y, rigid: Regressor, shape (T, n, 10 n), and sensitivities; None along long recordings, where they are evaluated
             again whenever they are needed.
     """
@@ -87,6 +87,7 @@ class Prepared:
     nominal: np.ndarray
     motor_side: np.ndarray
     inertia: np.ndarray
+    turns: list[np.ndarray]
     Y: np.ndarray | None
     rigid: RigidBody | None
 
@@ -102,12 +103,12 @@ class Prepared:
 
     def torque_of(self, dphi: np.ndarray) -> np.ndarray:
         """Torque of shifts of the inertial parameters, (10 n, k), shape (T, n, k)."""
-        return np.concatenate([self.regressor_at(at) @ dphi for at in windows(len(self.recording.t))])
+        return np.concatenate([self.regressor_at(at) @ dphi for at in pieces(len(self.recording.t))])
 
 
-def windows(samples: int) -> list[slice]:
-    """So many samples in windows of `WINDOW`."""
-    return [slice(k, min(k + WINDOW, samples)) for k in range(0, samples, WINDOW)]
+def pieces(samples: int) -> list[slice]:
+    """So many samples, `CHUNK` at a time."""
+    return [slice(k, min(k + CHUNK, samples)) for k in range(0, samples, CHUNK)]
 
 
 def prepared(robot: Robot, recording: Conditioned, *, kept: bool = True) -> Prepared:
@@ -122,7 +123,7 @@ def prepared(robot: Robot, recording: Conditioned, *, kept: bool = True) -> Prep
     spring = np.asarray(robot.stiffness) * (recording.q - np.asarray(robot.springref))
     phi, links, bodies, regressors = np.asarray(robot.phi).ravel(), [], [], []
     inertia = np.zeros(robot.n)
-    for at in windows(len(recording.t)):
+    for at in pieces(len(recording.t)):
         Y = _regressor(robot, recording, at)
         rigid = _sensitivities(robot, recording, at, Y[..., -10:])
         links.append(Y @ phi)
@@ -132,7 +133,8 @@ def prepared(robot: Robot, recording: Conditioned, *, kept: bool = True) -> Prep
             bodies.append(rigid)
     nominal = np.concatenate(links) + motor_side + spring
     whole = (np.concatenate(regressors), _joined(bodies)) if kept else (None, None)
-    return Prepared(robot, robot, recording, nominal, motor_side, inertia / len(recording.t), *whole)
+    turns, inertia = [turning_points(q) for q in recording.q.T], inertia / len(recording.t)
+    return Prepared(robot, robot, recording, nominal, motor_side, inertia, turns, *whole)
 
 
 def all_prepared(robot: Robot, recordings: Sequence[Conditioned]) -> list[Prepared]:
@@ -146,7 +148,7 @@ def seen_by(robot: Robot, along: Prepared) -> Prepared:
     if along.rigid is None:
         return dataclasses.replace(along, seen=robot)
     r = along.recording
-    parts = [_sensitivities(robot, r, at, along.regressor_at(at)[..., -10:]) for at in windows(len(r.t))]
+    parts = [_sensitivities(robot, r, at, along.regressor_at(at)[..., -10:]) for at in pieces(len(r.t))]
     return dataclasses.replace(along, seen=robot, rigid=_joined(parts))
 
 
@@ -225,18 +227,18 @@ def columns_along(
     r = along.recording
     nominal = along.nominal
     load, total, carried, scaled = loads or (nominal, nominal, nominal - along.motor_side, nominal)
-    rate = np.gradient(scaled, float(np.mean(np.diff(r.t))), axis=0)
-    per_sample = (r.t - r.began, r.q, r.qd, r.qdd, load, total, carried, rate)
-    turns = [turning_points(q) for q in r.q.T]
+    per_sample = (r.t, r.q, r.qd, r.qdd, load, total, carried)
+    dt = float(r.t[-1] - r.t[0]) / (len(r.t) - 1)
     first, last = (0, len(r.t)) if at is None else (at.start, at.stop)
     out = np.empty((last - first, len(lib.entries[0])))
     for start in range(max(first - RUN_IN, 0), max(last - RUN_IN, 1), CHUNK - RUN_IN - RUN_OUT):
         piece, pad = slice(start, min(start + CHUNK, len(r.t))), max(start + CHUNK - len(r.t), 0)
         rigid = _each_sample(lambda x, pad=pad: _padded(x, pad), along.rigid_at(piece))
-        moving = (_padded(x[piece], pad) for x in per_sample)
+        t, *moving = (_padded(x[piece], pad) for x in per_sample)
+        rate = _padded(_rate(scaled, piece, dt), pad)
         near_rest = r.rest_speed, _padded(r.direction[piece], pad), np.array(float(recording))
-        motion = Motion(*moving, rigid, *near_rest)  # pyright: ignore[reportArgumentType, reportCallIssue]: NumPy
-        motion = dataclasses.replace(motion, turned=turned_before(r.q, turns, start, TURNS))
+        turned = turned_before(r.q, along.turns, start, TURNS)
+        motion = Motion(t - r.began, *moving, rate, rigid, *near_rest, turned)  # pyright: ignore[reportArgumentType, reportCallIssue]: NumPy
         begin, end = max(start + RUN_IN if start else 0, first), min(start + CHUNK - RUN_OUT, last)
         # One program for each effect: of all in one, XLA would evaluate parts again and again.
         effects, column = [_columns(b[0], b[1], b[2], motion) for b in lib.blocks], 0
@@ -244,6 +246,12 @@ def columns_along(
             out[begin - first : end - first, column : column + part.shape[1]] = part[begin - start : end - start]
             column += part.shape[1]
     return out
+
+
+def _rate(x: np.ndarray, at: slice, dt: float) -> np.ndarray:
+    """Time derivative at some samples, as that of all samples is there."""
+    first = max(at.start - 1, 0)
+    return np.gradient(x[first : at.stop + 1], dt, axis=0)[at.start - first :][: at.stop - at.start]
 
 
 def _padded(x: np.ndarray, pad: int) -> np.ndarray:

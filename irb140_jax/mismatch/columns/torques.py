@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -124,24 +125,26 @@ def composed(
         dphi_refit, dphi_corrected: Shift of the inertial parameters in either model, shape (10 n,).
     """
     columns = without(lib, columns, unbounded(lib, columns))
-    shifted = along.torque_of(np.stack([dphi_refit, dphi_corrected], axis=1))
-    load, inside = along.nominal + shifted[..., 1], along.motor_side
-    friction, scales, shifts = np.zeros((3, *load.shape))
-    for c, w in zip(lib.candidates, amplitudes, strict=True):
-        part = lib.torque(columns, c.columns, w)
-        match c.effect.place.at:
-            case At.LOG_SCALE:
-                scales += part
-            case At.LOG_TIMING:
-                shifts += part
-            case At.FRICTION:
-                friction += part
-            case at:
-                load = load + part
-                inside = inside + part if at is At.DRIVE else inside
-    total = load + friction
-    loads = Loads(load, total, load - inside, total + scales)
-    return Torques(along.nominal, along.nominal + shifted[..., 0], loads, total + (scales + shifts))
+    refit, corrected = np.moveaxis(along.torque_of(np.stack([dphi_refit, dphi_corrected], axis=1)), -1, 0)
+    both = zip(lib.candidates, amplitudes, strict=True)
+    parts = [(c.effect.place.at, lib.torque(columns, c.columns, w)) for c, w in both]
+    loads, logged = added_up(along.nominal + corrected, along.motor_side, parts)
+    return Torques(along.nominal, along.nominal + refit, loads, logged)
+
+
+def added_up(links: Any, motor_side: Any, parts: Sequence[tuple[At, Any]]) -> tuple[Loads, Any]:
+    """Torques on the way from the links to the log, and what is logged, (T, n) each [N m or N]; in NumPy or in JAX.
+
+    Args:
+        links: Of the rigid body, all that the model as given has included, (T, n).
+        motor_side: What of it the links don't feel, (T, n).
+        parts: Where each effect acts, and its torque (T, n).
+    """
+    of = {at: sum((x for where, x in parts if where is at), start=0.0 * links) for at in At}
+    load = links + of[At.LINKS] + of[At.DRIVE]
+    total = load + of[At.FRICTION]
+    scaled = total + of[At.LOG_SCALE]
+    return Loads(load, total, load - motor_side - of[At.DRIVE], scaled), scaled + of[At.LOG_TIMING]
 
 
 def library_of(robot: Robot, effects: Sequence[Named] | Sequence[Candidate]) -> Library:

@@ -9,10 +9,10 @@ from jaxtyping import Array, Float
 
 from irb140_jax.dynamics.chain import Plan, chain, plan
 from irb140_jax.dynamics.newton_euler import rigid_torque
-from irb140_jax.effects import At, Effect, Motion, RigidBody
+from irb140_jax.effects import Effect, Motion, RigidBody
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.columns.sensitivities import Sensitivities
-from irb140_jax.mismatch.columns.torques import better_known
+from irb140_jax.mismatch.columns.torques import added_up, better_known
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.robot import Robot, with_phi
 from irb140_jax.simulate import AbstractPlant
@@ -172,25 +172,14 @@ class CorrectedRobot(AbstractPlant):
 
     def summed(self, motion: Motion, base: JointSamples, stepped) -> tuple[JointSamples, ...]:
         """Load, total, carried and scaled torque (see `Loads`), and what is logged."""
-        friction, scales, shifts, load = *[jnp.zeros_like(base)] * 3, base
-        inside = self.motor_side(motion.qd, motion.qdd)
+        parts = []
         for k, a in enumerate(self.effects):
             rows = jnp.arange(self.n) if a.effect.place.everywhere else jnp.array(a.joints)
             given = None if stepped is None else stepped[k]
             columns = a.effect.law.columns(motion, jnp.array(a.joints), a.shape) if given is None else given[None]
-            part = jnp.zeros_like(base).at[:, rows].add(columns @ a.amplitudes)
-            match a.effect.place.at:
-                case At.LOG_SCALE:
-                    scales += part
-                case At.LOG_TIMING:
-                    shifts += part
-                case At.FRICTION:
-                    friction += part
-                case at:
-                    load += part
-                    inside += part if at is At.DRIVE else 0.0
-        total = load + friction
-        return load, total, load - inside, total + scales, total + scales + shifts
+            parts.append((a.effect.place.at, jnp.zeros_like(base).at[:, rows].add(columns @ a.amplitudes)))
+        loads, logged = added_up(base, self.motor_side(motion.qd, motion.qdd), parts)
+        return *loads, logged  # pyright: ignore[reportReturnType]: arrays of JAX here
 
     def own_torque(self, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> JointSamples:
         """Rotors, friction and springs of the model as given."""

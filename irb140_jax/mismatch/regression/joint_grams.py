@@ -88,10 +88,8 @@ def grams_by_block(
         columns: Which columns, inertials first.
         blocks: Contiguous blocks per recording.
     """
-    return tuple(
-        _gram_by_block(data, extra, noise, misfits(noise, sensors), columns, blocks, j)
-        for j in range(data.stretches[0].y.shape[1])
-    )
+    misfit = misfits(noise, sensors)
+    return tuple(_gram_by_block(data, extra, noise, misfit, columns, blocks, j) for j in range(len(misfit)))
 
 
 def _gram_by_block(

@@ -70,30 +70,32 @@ class Stretch:
     def of(self, columns: np.ndarray, joint: int | None = None) -> np.ndarray:
         """Some columns, (R, n, columns), or those of one joint, (R, columns)."""
         inertials, amplitudes = (x if joint is None else x[:, joint] for x in (self.inertials, self.amplitudes))
-        k = inertials.shape[-1]
-        columns = np.where(columns < k + self.size, columns, columns - k - self.size)
-        links, out = columns < k, np.empty((*inertials.shape[:-1], len(columns)))
-        out[..., links] = inertials[..., columns[links]]
-        out[..., ~links] = amplitudes[..., np.searchsorted(self.held, columns[~links] - k)]
+        links, at, where = self._places(columns)
+        out = np.empty((*inertials.shape[:-1], len(columns)))
+        out[..., links], out[..., ~links] = inertials[..., at], amplitudes[..., where]
         return out
 
     def torque(self, columns: np.ndarray, w: np.ndarray) -> np.ndarray:
         """What some columns add up to with amplitudes w, shape (R, n)."""
+        links, at, where = self._places(columns)
+        inertials, amplitudes = np.zeros(self.inertials.shape[-1]), np.zeros(len(self.held))
+        np.add.at(inertials, at, w[links])
+        np.add.at(amplitudes, where, w[~links])
+        return self.inertials @ inertials + self.amplitudes @ amplitudes
+
+    def _places(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Which columns are inertials, where those stand among the inertials, and the others among what is held."""
         k = self.inertials.shape[-1]
         columns = np.where(columns < k + self.size, columns, columns - k - self.size)
-        links, weights = columns < k, (np.zeros(k), np.zeros(len(self.held)))
-        np.add.at(weights[0], columns[links], w[links])
-        np.add.at(weights[1], np.searchsorted(self.held, columns[~links] - k), w[~links])
-        return self.inertials @ weights[0] + self.amplitudes @ weights[1]
+        links = columns < k
+        return links, columns[links], np.searchsorted(self.held, columns[~links] - k)
 
     def of_rigid_body(self) -> "Stretch":
-        """With inertials alone, as they are without any explanation."""
-        return dataclasses.replace(self.holding(), inertials=self.rigid, y=self.tau - self.nominal)
+        """With inertials as they are without any explanation, and what they alone should add up to."""
+        return dataclasses.replace(self, inertials=self.rigid, y=self.tau - self.nominal)
 
-    def holding(self, held: np.ndarray | None = None, amplitudes: np.ndarray | None = None) -> "Stretch":
-        """With the columns of these amplitudes; of none by default."""
-        if held is None or amplitudes is None:
-            held, amplitudes = np.zeros(0, dtype=int), np.zeros((*self.y.shape, 0))
+    def holding(self, held: np.ndarray, amplitudes: np.ndarray) -> "Stretch":
+        """With the columns (R, n, k) of amplitudes of these numbers (k,)."""
         return dataclasses.replace(self, held=held, amplitudes=amplitudes)
 
 
@@ -119,7 +121,7 @@ class Window(NamedTuple):
         return band.apply(x[begin : begin + count])
 
 
-def windows(band: Band, samples: int, margin: int = 0, overlap: int = 0) -> Iterator[Window]:
+def row_windows(band: Band, samples: int, margin: int = 0, overlap: int = 0) -> Iterator[Window]:
     """All rows of a recording of so many samples, some at a time; each but the first with some of those before."""
     taps, count = len(band.low_pass()), len(band.kept(samples))
     for new in range(0, count, ROWS):
@@ -144,18 +146,19 @@ def candidate_rows(
         overlap: Rows of the window before that come again.
 
     Returns:
-        The window, the columns that aren't zero throughout, (rows, entries), and amplitudes of no law in it.
+        The window, the columns that aren't zero throughout, (rows, entries), and amplitudes whose columns have no bound
+        in it.
     """
     recording, dt = along.recording, float(np.mean(np.diff(along.recording.t)))
     late = at if at and loads and at.log else None
     margin = int(np.ceil(MARGIN / dt)) if late else 0
-    for window in windows(band, len(recording.t), margin, overlap):
+    for window in row_windows(band, len(recording.t), margin, overlap):
         columns = columns_along(lib, along, loads, index, window.samples)
-        lawless = unbounded(lib, columns)
-        columns = without(lib, columns, lawless)
+        endless = unbounded(lib, columns)
+        columns = without(lib, columns, endless)
         if late:
             columns = logged(late, columns, np.where(lib.in_log, -1, lib.entries[0]), dt)
-        yield window, window.low_passed(columns, band), lawless
+        yield window, window.low_passed(columns, band), endless
 
 
 def stretch(
@@ -202,11 +205,11 @@ def _dense(
 ) -> np.ndarray:
     """Columns of all amplitudes of a library, shape (R, n, size)."""
     out = np.zeros((len(band.kept(len(along.recording.t))), lib.robot.n, lib.size))
-    lawless: list[np.ndarray] = [np.zeros(0, dtype=int)]
+    endless: list[np.ndarray] = [np.zeros(0, dtype=int)]
     for window, columns, bad in candidate_rows(lib, along, index, band, loads, at):
         lib.spread(columns, out[window.rows])
-        lawless.append(bad)
-    out[..., np.concatenate(lawless)] = 0.0
+        endless.append(bad)
+    out[..., np.concatenate(endless)] = 0.0
     return out
 
 
@@ -240,7 +243,7 @@ def _inertials(
     n, k = along.nominal.shape[1], len(factor)
     margin = int(np.ceil(MARGIN / dt)) if at and at.log else 0
     rigid, found = [], []
-    for window in windows(band, len(along.recording.t), margin):
+    for window in row_windows(band, len(along.recording.t), margin):
         upright = along.regressor_at(window.samples)
         rigid.append(window.low_passed(upright, band) @ factor)
         if at:

@@ -72,12 +72,12 @@ def _scanned(
 
 def _thin_columns(lib: Library, along: Sequence[Prepared], band: Band) -> np.ndarray:
     """Columns of a library at the rows that a scan looks at, shape (rows, n, size)."""
-    every, thin, lawless = [], _thin([len(band.kept(len(a.recording.t))) for a in along]), [np.zeros(0, dtype=int)]
+    every, thin, endless = [], _thin([len(band.kept(len(a.recording.t))) for a in along]), [np.zeros(0, dtype=int)]
     for i, a in enumerate(along):
         for window, columns, bad in candidate_rows(lib, a, i, band):
             every.append(columns[-window.new % thin :: thin].copy())  # a view would keep the whole window
-            lawless.append(bad)
-    columns = without(lib, np.concatenate(every)[::THIN], np.concatenate(lawless))
+            endless.append(bad)
+    columns = without(lib, np.concatenate(every)[::THIN], np.concatenate(endless))
     out = np.zeros((len(columns), lib.robot.n, lib.size))
     lib.spread(columns, out)
     return out

@@ -4,6 +4,7 @@ import dataclasses
 import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,13 +26,13 @@ class Sums:
             [own | inertials | common | amplitudes | y], the last three in their own units.
         rows: Of each joint, by the same: how many rows count.
         power: Sum of the squares of each column that isn't zero throughout, all rows alike, shape (entries,).
-        lawless: Amplitudes that are of no law along these recordings.
+        endless: Amplitudes whose columns have no bound along these recordings.
     """
 
     grams: list[dict[int, np.ndarray]]
     rows: list[dict[int, float]]
     power: np.ndarray
-    lawless: np.ndarray
+    endless: np.ndarray
 
     @property
     def finite(self) -> bool:
@@ -58,25 +59,26 @@ def summed(
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         for s, e, windows in zip(stretches, extra, rows, strict=True):
             usable = [noise.usable(s.use[:, j], j) for j in range(n)]
-            for window, columns, lawless in windows(ORDER):
-                fresh = window.new - window.rows.start
-                out.power += np.einsum("te,te->e", columns[fresh:], columns[fresh:])
-                out.lawless = np.union1d(out.lawless, lawless)
-
-                def add(j: int, s=s, e=e, window=window, columns=columns, fresh=fresh, usable=usable) -> None:
-                    at = window.rows
-                    A = np.concatenate([
-                        e.own[j][at], s.inertials[at, j], e.common[at, j], columns[:, own[j]], s.y[at, [j]],
-                    ], axis=1)  # fmt: skip
-                    counts = usable[j][at].copy()
-                    counts[:fresh] = False
-                    A = noise.whitened(A, j, s.recording, s.unsure[at, j])[counts]
-                    _added(out.grams[j], s.repeats, A.T @ A)
-                    _added(out.rows[j], s.repeats, float(len(A)))
-
-                list(threads.map(add, range(n)))
-    out.power[np.isin(lib.entries[1], out.lawless)] = 0.0  # never named
+            for window, columns, endless in windows(ORDER):
+                fresh = columns[window.new - window.rows.start :]
+                out.power += np.einsum("te,te->e", fresh, fresh)
+                out.endless = np.union1d(out.endless, endless)
+                list(threads.map(partial(_add, out, s, e, noise, window, columns, own, usable), range(n)))
+    out.power[np.isin(lib.entries[1], out.endless)] = 0.0  # never named
     return out
+
+
+def _add(
+    out: Sums, s: Stretch, e: Nuisances, noise: Noise, window: Window, columns: np.ndarray, own: list[np.ndarray],
+    usable: list[np.ndarray], j: int,
+) -> None:  # fmt: skip
+    """Add a window of one joint's rows; `own` are its entries among the columns, `usable` its rows that count."""
+    at = window.rows
+    A = [e.own[j][at], s.inertials[at, j], e.common[at, j], columns[:, own[j]], s.y[at, [j]]]
+    counts = usable[j][at] & (np.arange(at.start, at.stop) >= window.new)
+    A = noise.whitened(np.concatenate(A, axis=1), j, s.recording, s.unsure[at, j])[counts]
+    _added(out.grams[j], s.repeats, A.T @ A)
+    _added(out.rows[j], s.repeats, float(len(A)))
 
 
 def _added(sums: dict[int, Any], key: int, more: Any) -> None:

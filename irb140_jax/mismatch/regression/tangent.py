@@ -16,7 +16,7 @@ import numpy as np
 
 from irb140_jax import dynamics
 from irb140_jax.effects import At
-from irb140_jax.mismatch.columns.along import Loads, Prepared, windows
+from irb140_jax.mismatch.columns.along import Loads, Prepared, pieces
 from irb140_jax.mismatch.columns.torques import Named, as_named
 from irb140_jax.robot import Robot
 
@@ -71,7 +71,7 @@ def leaning(at: Point, along: Prepared) -> np.ndarray:
     """Torque of the shifted inertials by what gravity found differs from the model's, shape (T, n)."""
     if at.leaning is None:
         return np.zeros_like(along.nominal)
-    parts = [(regressor(at, along, s) - along.regressor_at(s)) @ at.dphi for s in windows(len(along.recording.t))]
+    parts = [(regressor(at, along, s) - along.regressor_at(s)) @ at.dphi for s in pieces(len(along.recording.t))]
     return np.concatenate(parts)
 
 
