@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from irb140_jax.effects import Scales, external_wrench
-from irb140_jax.effects.contact import _alike, _around, _finer, _gain, _peak, _scout, _wall
+from irb140_jax.effects.contact import _alike, _around, _finer, _gain, _peak, _proposal, _wall
 from irb140_jax.effects.left_over import LeftOver
 
 ACROSS = np.array([0.6, 0.0, 0.8])  # the arm moves in the plane across it
@@ -45,7 +45,7 @@ def test_a_wall_is_sought_where_the_arm_moves_and_tilted_only_there(seed):
     rng = np.random.default_rng(seed)
     normal = rng.normal(size=3)
     left, wall = left_over(seed, normal / np.linalg.norm(normal))
-    grid = _scout(left, SCALES, np.arange(2))
+    grid = _proposal(left, SCALES, np.arange(2))
     assert grid is not None
     np.testing.assert_allclose(grid[:, :3] @ ACROSS, 0.0, atol=1e-9)
     flat = wall[:3] - ACROSS * (ACROSS @ wall[:3])
@@ -64,7 +64,7 @@ def test_a_wall_is_sought_where_the_arm_moves_and_tilted_only_there(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_a_wall_is_turned_about_the_place_of_contact(seed):
     left, _ = left_over(seed, np.array([0.0, 1.0, 0.0]))
-    grid = _scout(left, SCALES, np.arange(2))
+    grid = _proposal(left, SCALES, np.arange(2))
     assert grid is not None
     depth = np.maximum(grid[:, 3] - left.tool @ grid[:, :3].T, 0.0)
     # To first order a turn makes the wall deeper on one side and less deep on the other, by as much.

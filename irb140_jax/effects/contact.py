@@ -54,7 +54,7 @@ def _finer(grid, best):
     return _around(best, turns, max(tilt, 1e-5), max(float(shift) * (1.0 if at > 4 else 0.5), 1e-7))
 
 
-def _scout(left, scales, joints):
+def _proposal(left, scales, joints):
     left = left.every(THIN)
     felt, _ = _felt(left.tool)
     travel = float(np.ptp(left.tool, axis=0).max())
@@ -191,7 +191,7 @@ EFFECT = Effect(
     ),
     place=Place(sites=all_joints, everywhere=True),
     prior=Prior(lowest=(0.0,)),
-    shapes=Shapes(grid=_grid, finer=_finer, peak=_peak, scout=_scout, scanned=SCANNED, alike=_alike),
+    shapes=Shapes(grid=_grid, finer=_finer, peak=_peak, proposal=_proposal, scanned=SCANNED, alike=_alike),
     export=Export(
         not_in_mjcf="it is left out: MuJoCo needs a geometry for a wall, whose stiffness comes from the solver"
     ),

@@ -51,7 +51,7 @@ def _around(span, step, rises):
     return at
 
 
-def _scout(left, scales, joints):
+def _proposal(left, scales, joints):
     best, gain, left = None, -np.inf, left.every(THIN)
     for recording in np.unique(left.recording):
         rows = left.recording == recording
@@ -130,7 +130,7 @@ EFFECT = Effect(
     ),
     place=Place(sites=all_joints, everywhere=True),
     shapes=Shapes(
-        grid=_grid, finer=_finer, scout=_scout, scanned=EDGES**2, alike=_alike, blur=_blur,
+        grid=_grid, finer=_finer, proposal=_proposal, scanned=EDGES**2, alike=_alike, blur=_blur,
         during=lambda shape: (round(float(shape[2])) - 1, float(shape[0]), float(shape[1])),
     ),
     export=Export(not_in_mjcf="it is left out: it happened once and is no part of the machine"),

@@ -192,8 +192,8 @@ class Shapes:
         scan: From sizes and site to many shapes that are tried one by one before the search, (any, s).
         around: From the best shape of the scan to the grid of the search, as many points as `grid` gives.
         beside: Slugs of effects that are left free in a scan: without them it would find what stands in for them.
-        scout: From what is left in the recordings, sizes and site to a grid of shapes that it suggests, or None.
-        scanned: From how many shapes a scan or a scout picks the best: what chance has as many tries at.
+        proposal: From what is left in the recordings, sizes and site to a grid of shapes that it suggests, or None.
+        scanned: From how many shapes a scan or a proposal picks the best: what chance has as many tries at.
         alike: From what is left, w (k,) and shape to physical parameters (any, p) of others that no such recordings
             could tell from it, as far off either way as one standard deviation of what is known of them beforehand.
         blur: From a shape to the standard deviation (p,) below which a physical parameter has no meaning.
@@ -209,7 +209,7 @@ class Shapes:
     scan: Callable[[Scales, np.ndarray], np.ndarray] | None = None
     around: Callable[[np.ndarray], np.ndarray] | None = None
     beside: tuple[str, ...] = ()
-    scout: Callable[[LeftOver, Scales, np.ndarray], np.ndarray | None] | None = None
+    proposal: Callable[[LeftOver, Scales, np.ndarray], np.ndarray | None] | None = None
     scanned: int = 1
     alike: Callable[[LeftOver, np.ndarray, np.ndarray], np.ndarray] | None = None
     blur: Callable[[np.ndarray], np.ndarray] | None = None

@@ -30,7 +30,7 @@ def _finer(grid, best):
     return np.maximum(best[0] + min(step, 0.2 * best[0]) * np.linspace(-1.0, 1.0, POINTS), 1e-6)[:, None]
 
 
-def _scout(left, scales, joints):
+def _proposal(left, scales, joints):
     use = left.weight[:, joints[0]] > 0
     q, residual = left.q[use, joints[0]], left.residual[use, joints[0]]
     span = _span(scales, joints)
@@ -77,7 +77,7 @@ EFFECT = Effect(
     place=Place(At.DRIVE),
     shapes=Shapes(
         grid=lambda scales, joints: np.geomspace(FEWEST_PERIODS, 30.0, POINTS)[:, None] / _span(scales, joints),
-        finer=_finer, scout=_scout, scanned=100,
+        finer=_finer, proposal=_proposal, scanned=100,
     ),
     export=Export(not_in_mjcf="it is left out: MJCF has no joint torque that is periodic in position"),
 )

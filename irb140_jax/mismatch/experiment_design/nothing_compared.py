@@ -36,7 +36,7 @@ def all_open(
     matters = reference(lib, scales, band.rate)
     shapes: dict[Site, list[Candidate]] = {}
     for c in lib.candidates:
-        if not (c.effect.shapes.scout and not matters.amplitudes[c.columns].any()):  # see `testable.visibility`
+        if not (c.effect.shapes.proposal and not matters.amplitudes[c.columns].any()):  # see `testable.visibility`
             shapes.setdefault((c.slug, c.joints), []).append(c)
     middle = [alike[len(alike) // 2] for alike in shapes.values()]
     columns = tuple(Column(c.effect, c.joints, tuple(map(float, c.shape)), c.variant) for c in middle)

@@ -16,6 +16,7 @@ from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, pri
 from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
 from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.regression.nuisances import Nuisances, nuisances
+from irb140_jax.mismatch.regression.proposals import left_over, suggested, with_proposals
 from irb140_jax.mismatch.regression.rows import (
     Stretch,
     bare_stretch,
@@ -23,7 +24,6 @@ from irb140_jax.mismatch.regression.rows import (
     with_candidates,
     with_library,
 )
-from irb140_jax.mismatch.regression.scout import left_over, scouted, suggested
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
 from irb140_jax.mismatch.selection.averages import site_of
@@ -61,7 +61,7 @@ def explain(
     progress("rigid body along the recordings")
     along, factor = all_prepared(robot, recordings), inertial_prior_factor(robot, 1.0)
     scales = scales_of(along)
-    first = scouted(library(robot, effects, scales), along, band, factor, uncertainty, scales)
+    first = with_proposals(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     given = _Given(first, scales, band, factor, uncertainty, sensors, progress)
     start, unsettled = _Start(1, first, along, [None] * len(along)), True
     while start.round < PASSES or (unsettled and start.round < MOST_PASSES):
@@ -233,7 +233,7 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
                 best[mine[0]], peak = _peak(ex, mine[0])
                 follows = effect.shapes.follows or (lambda _, shape: shape)
                 new[s] = effect.shapes.finer(old[s], follows(amplitudes[mine[0]], peak))
-            elif effect.shapes.scout and not mine:
+            elif effect.shapes.proposal and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)
     refined = reshaped(ex.lib, shapes)

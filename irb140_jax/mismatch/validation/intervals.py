@@ -8,7 +8,7 @@ import numpy as np
 from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
-from irb140_jax.mismatch.regression.scout import left_over
+from irb140_jax.mismatch.regression.proposals import left_over
 from irb140_jax.mismatch.result import Estimate
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.robot import Robot

@@ -119,7 +119,7 @@ def visibility(ex: Explanation, matters: Reference) -> Seen:
     for i, c in enumerate(ex.data.candidates):
         if c.is_inertials or any(_related(c, m) for m in ex.members):
             continue
-        if c.effect.shapes.scout and not matters.amplitudes[c.columns].any():
+        if c.effect.shapes.proposal and not matters.amplitudes[c.columns].any():
             continue  # a wall or a push at no place or time in particular
         scale = ex.data.scale[ex.data.nuisances + c.columns]
         strength = matters.in_prior_units(c.columns, scale)

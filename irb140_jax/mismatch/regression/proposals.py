@@ -18,7 +18,7 @@ AT_ONCE = 64  # candidates of a scan in one product: fast, and not much memory
 MOST_ROWS = 2000  # thinned to so many: shapes are found from what is large and slow
 
 
-def scouted(
+def with_proposals(
     lib: Library, along: Sequence[Prepared], band: Band, factor: np.ndarray, uncertainty: float, scales: Scales
 ) -> Library:
     """The library with shapes from what inertials and ordinary friction leave, before anything rarer is tried.
@@ -84,13 +84,13 @@ def _thin_columns(lib: Library, along: Sequence[Prepared], band: Band) -> np.nda
 
 
 def _thinned(stretches: Sequence[Stretch], part: Callable[[Stretch], np.ndarray]) -> np.ndarray:
-    """An array of all recordings' rows, thinned to what scouts need."""
+    """An array of all recordings' rows, thinned to what proposals need."""
     thin = _thin([len(s.t) for s in stretches])
     return np.concatenate([part(s)[::thin] for s in stretches])
 
 
 def _thin(rows: Sequence[int]) -> int:
-    """Every how many rows of recordings of so many scouts look at one."""
+    """Every how many rows of recordings of so many proposals look at one."""
     return max(1, sum(rows) // MOST_ROWS)
 
 
@@ -98,7 +98,7 @@ def suggested(
     effect: Effect, left: LeftOver, scales: Scales, joints: np.ndarray, otherwise: np.ndarray
 ) -> np.ndarray:
     """The shapes that an effect finds in what is left, or else those it had."""
-    shapes = effect.shapes.scout(left, scales, joints) if effect.shapes.scout else None
+    shapes = effect.shapes.proposal(left, scales, joints) if effect.shapes.proposal else None
     return otherwise if shapes is None else shapes
 
 
