@@ -57,10 +57,11 @@ class Case:
         draw, index: Which case.
         xml: MJCF text of the nominal model.
         joint_names: Of its joints.
-        recordings: Arrays t, q, tau, where logged qd, and tau_true, the torque channels without noise; (T,) and (T, n).
+        recordings: What `logged` returns of each motion.
         held_out: The same of motions that no diagnosis sees; `tau` is there without noise, too.
         truth: See `truth_of`.
         hidden: Kinds that were drawn.
+        plant: What was recorded.
     """
 
     draw: str
@@ -71,6 +72,7 @@ class Case:
     held_out: list[dict[str, np.ndarray]]
     truth: dict[str, Any]
     hidden: tuple[str, ...]
+    plant: Plant
 
 
 def kinds_of(draw: str, index: int, commit: str = "") -> tuple[str, ...]:
@@ -157,7 +159,7 @@ def assembled(
         for j in plant.dead:
             r["tau"][:, j] = np.round(r["tau_true"][:, j], 6)  # a dead channel has no noise either
     truth = truth_of(plant, sizes, logger) | setting
-    return Case(draw, index, plant.nominal.xml, plant.nominal.names, recordings, held_out, truth, kinds)
+    return Case(draw, index, plant.nominal.xml, plant.nominal.names, recordings, held_out, truth, kinds, plant)
 
 
 def truth_of(plant: Plant, sizes: Sizes, logger: Logger) -> dict[str, Any]:

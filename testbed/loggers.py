@@ -49,7 +49,9 @@ def random_logger(rng: np.random.Generator, slide: np.ndarray, size: np.ndarray,
 def logged(
     logger: Logger, rng: np.random.Generator, t: np.ndarray, q: np.ndarray, qd: np.ndarray, tau: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """One recording: t, q, tau, qd where it is logged, and tau_true, which no file shows.
+    """One recording: t, q, tau, qd where it is logged, and what no file shows: tau_true, and `began`.
+
+    `began` is the time by the channels' clock at which the log's is zero.
 
     Args:
         logger: Its make.
@@ -67,6 +69,7 @@ def logged(
         "t": (taken if logger.told else due) - due[0] + 1.0,
         "q": np.round(positions / logger.counts) * logger.counts,
         "tau": np.round(noisy / logger.steps) * logger.steps, "tau_true": true,
+        "began": due[0] - 1.0,
     }  # fmt: skip
     if logger.speed:
         out["qd"] = at(qd) + 2.0 * logger.counts * logger.rate * rng.normal(size=true.shape) * 0.1

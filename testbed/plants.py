@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
+from scipy import interpolate
 
 from testbed import drives, flexible, rigid
 from testbed.arms import Arm
@@ -124,6 +125,23 @@ def channels(plant: Plant, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     for j, shown in plant.dead.items():
         tau[:, j] = shown(motion.t, tau[:, j])
     return motion.q + plant.zero, tau
+
+
+def torque_along(
+    plant: Plant, t: np.ndarray, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, number: int
+) -> np.ndarray:
+    """Torque channels along a motion that is known at some times only, such as a measured one, (T, n).
+
+    Args:
+        plant: Which.
+        t: By the channels' clock [s], shape (T,).
+        q, qd, qdd: Positions as logged, and their derivatives, shape (T, n).
+        number: Of the recording.
+    """
+    fine = np.arange(t[0], t[-1], STEP)
+    at = lambda x: interpolate.CubicSpline(t, x)(fine)  # noqa: E731
+    tau = channels(plant, Motion(fine, at(q - plant.zero), at(qd), at(qdd), number))[1]
+    return np.stack([np.interp(t, fine, c) for c in tau.T], axis=1)
 
 
 def on(j: int, law: Callable[[Motion, np.ndarray], np.ndarray]) -> Law:

@@ -43,8 +43,9 @@ def figures(lines: Lines) -> Rows:
            "85 to 95 %" if level == 0.9 else "") for level in LEVELS),
         *_about_classes([c for c in classes if c["slug"]]),
         ("torque constants named within 5 %", counted(of(scoring.gains)), ""),
-        ("stated noise over the sensors', median", _median(of(scoring.floors)), ""),
-        ("joints where it is at most 1.3", counted([x <= 1.3 for x in of(scoring.floors)]), "all"),
+        *_about_noise("stated noise over the torque sensors'", of(scoring.floors), ""),
+        *_about_noise("stated noise over what the true plant leaves along the logged positions",
+                      of(lambda x: scoring.floors(x, "left_in_band")), "all"),
         ("things without a name that are located, named alike or noted",
          counted([how != "not said" for _, how in of(scoring.located)]), ""),
         ("error on unseen motions over refit's, median where something without a name is hidden",
@@ -54,6 +55,11 @@ def figures(lines: Lines) -> Rows:
         ("exported models with a link that no body can be",
          each(lambda x: bool(x["impossible"].get("corrected"))), "none"),
     ]  # fmt: skip
+
+
+def _about_noise(name: str, floors: list[float], goal: str) -> Rows:
+    return [(f"{name}, median", _median(floors), ""),
+            ("joints where it is at most 1.3", counted([x <= 1.3 for x in floors]), goal)]  # fmt: skip
 
 
 def _about_names(lines: Lines, stated: list[tuple[str, float, bool]]) -> Rows:

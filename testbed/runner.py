@@ -26,6 +26,7 @@ import tyro
 from scipy import signal
 
 from testbed.cases import Case, Variation, make
+from testbed.plants import torque_along
 
 RESULTS = pathlib.Path(__file__).parents[1] / "results"
 KEPT = ("verdict", "findings", "unexplained", "not_testable", "fit", "notes", "summary")
@@ -67,7 +68,8 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
         diagnosis: The document's parts that say something about the robot; None where it was refused or failed.
         refused, failed: What the package said instead, or the exception's name and text.
         unseen: Error of nominal, refit and corrected on motions that nobody fitted, RMS a joint [N m or N].
-        band: Frequency below which it was compared [Hz]; noise_in_band: what of the sensors' noise lies there.
+        band: Frequency below which it was compared [Hz]; noise_in_band: what of the torque sensors' noise lies there;
+            left_in_band: what the true plant leaves there along the positions as they are known.
         impossible: Links whose exported inertials no body has, by model.
     """
     # Here, so that cases can be made where the package is not installed.
@@ -85,6 +87,7 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
         out["diagnosis"] = {k: v for k, v in result.diagnosis.to_json().items() if k in KEPT}
         out["sentences"] = [x["sentence"] for x in result.views.to_json()["inertials"] if x["sentence"]]
         out |= _compared(case, result, [mismatch.predict(result.model, r) for r in unseen])
+        out["left_in_band"] = left_by_the_truth(case, robot, recordings, out["band"])
     except InputError as error:
         out["refused"] = re.sub(r"\S*/(?=\w+\.\w+)", "", str(error))  # file names, without this machine's folders
     except Exception as error:  # a crash is a result, too
@@ -121,6 +124,24 @@ def _compared(case: Case, result: Any, torques: list[dict[str, np.ndarray]]) -> 
     bodies = {k: np.asarray(getattr(model, f"phi_{k}")) for k in ("refit", "corrected") if hasattr(model, f"phi_{k}")}
     impossible = {k: [names[j] for j, p in enumerate(v) if not possible(p)] for k, v in bodies.items()}
     return {"unseen": unseen, "band": band, "noise_in_band": rms(noise), "impossible": impossible}
+
+
+def left_by_the_truth(case: Case, robot: Any, recordings: list[Any], band: float) -> dict[str, float]:
+    """What nobody can explain: logged torque less that of the true plant along the motion as the package knows it.
+
+    The torque sensors' noise, and what errors of positions, of their derivatives and of clocks make of the plant's own
+    torque, in the rows that the package compares; RMS a joint [N m or N].
+    """
+    from irb140_jax.mismatch.regression.sufficient_data import comparable
+
+    left, rows = np.zeros(robot.n), np.zeros(robot.n)
+    for r in comparable(robot, recordings)[2]:
+        number = int(re.findall(r"\d+", r.source)[-1])
+        true = torque_along(case.plant, r.t + case.recordings[number]["began"], r.q, r.qd, r.qdd, number)
+        use = r.usable & _inner(r.t)[:, None]
+        left += np.sum(np.where(use, low_passed(r.tau - true, r.t, band), 0.0) ** 2, axis=0)
+        rows += use.sum(axis=0)
+    return dict(zip(case.joint_names, np.sqrt(left / np.maximum(rows, 1)).tolist(), strict=True))
 
 
 def _inner(t: np.ndarray) -> np.ndarray:

@@ -93,9 +93,9 @@ def gains(line: dict[str, Any]) -> list[bool]:
     return out
 
 
-def floors(line: dict[str, Any]) -> list[float]:
-    """Stated noise over the sensors' own in the same band, one a joint that is alive."""
-    noise, dead = line["noise_in_band"], line["truth"]["dead"]
+def floors(line: dict[str, Any], of: str = "noise_in_band") -> list[float]:
+    """Stated noise over the torque sensors', or over what the true plant leaves (`left_in_band`), one a live joint."""
+    noise, dead = line.get(of, {}), line["truth"]["dead"]
     fit = line["diagnosis"]["fit"]
     return [fit[j]["noise_floor"] / noise[j] for j in noise
             if j not in dead and j in fit and fit[j].get("noise_floor") and noise[j] > 0.0]  # fmt: skip

@@ -7,9 +7,9 @@ import pytest
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from testbed import cases, probes, rubbing, runner, seeds
-from testbed.arms import built, random_arm
-from testbed.loggers import random_logger
+from testbed import cases, leaving_out, probes, rubbing, runner, seeds
+from testbed.arms import built, irb140, random_arm
+from testbed.loggers import Logger, random_logger
 from testbed.motions import programme
 from testbed.plants import Plant, sizes_of
 
@@ -113,6 +113,23 @@ def test_a_body_with_negative_mass_or_a_flat_inertia_is_impossible():
     assert runner.possible(np.array([2.0, 0.2, 0, 0, 0.1, 0, 0, 0.12, 0, 0.12]))
     assert not runner.possible(np.array([-0.1, 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.1]))
     assert not runner.possible(np.array([2.0, 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.5]))
+
+
+@pytest.mark.parametrize("hide", [leaving_out.push, rubbing.warming, leaving_out.zero, leaving_out.skew])
+def test_the_true_plant_leaves_the_torque_sensors_noise_where_positions_are_exact(hide, tmp_path):
+    rng = np.random.default_rng(2)
+    plant = Plant(irb140(), irb140())
+    moves = programme(plant.arm, rng, "fourier", 6.0)
+    sizes = sizes_of(plant.arm, moves)
+    hide(plant, sizes, rng, 2, 0.1 * sizes.tau[2])
+    rubbing.rubbed(plant, sizes, rng)
+    exact = Logger(500.0, 0.0, True, np.full(6, 1e-12), 0.01 * sizes.tau, 1e-9 * sizes.tau)
+    case = cases.assembled("work", 0, ("one",), plant, sizes, moves, moves[:1], exact, rng, {})
+    robot, recordings, _ = runner.read_case(case, tmp_path)
+    left = runner.left_by_the_truth(case, robot, recordings, 10.0)
+    expected = 0.01 * np.sqrt(10.0 / 250.0)  # of each joint's torque: white noise below 10 Hz of 250 Hz
+    # Dry friction turns within a hundredth of the usual speed, which smoothing blurs a little.
+    np.testing.assert_allclose([left[name] for name in case.joint_names], expected * sizes.tau, rtol=0.3)
 
 
 def test_noise_below_a_band_is_that_share_of_white_noise():

@@ -58,6 +58,8 @@ def test_floors_errors_and_places_are_read_off():
     odd = [hidden(None, "a", unnamed=True)]
     got = line([], odd, unexplained=[{"joints": ["a"], "share": 0.5}])
     assert scoring.floors(got) == pytest.approx([3.0, 1.0])
+    assert scoring.floors(got | {"left_in_band": {"a": 0.2, "b": 0.1}}, "left_in_band") == pytest.approx([1.5, 1.0])
+    assert scoring.floors(got, "left_in_band") == []  # of results that were stored before it was measured
     assert scoring.unseen_ratio(got) == pytest.approx(0.5)
     assert scoring.located(got) == [("odd", "located")]
     assert scoring.located(line([], odd, notes=["a: its torque is constant"])) == [("odd", "noted")]
