@@ -12,7 +12,7 @@ from testbed.rubbing import ORDINARY
 EVERYWHERE = ("time_delay", "gravity_tilt", "payload", "contact", "external_wrench")
 GAIN_WITHIN = 0.05
 # What a note has to speak of besides the joint, so that a repaired sample is no statement about a dead channel.
-OF_THE_LOG = re.compile(r"dead|froz|constant|zero|stuck|differ|between recordings|late|delay|saturat", re.IGNORECASE)
+OF_THE_LOG = re.compile(r"dead|froz|constant|zero|stuck|differ|between recordings|\blate\b|delay|saturat", re.I)
 NOT_A_BODY = re.compile(r"(?:mass|Ixx|Iyy|Izz)[^,;]*? (?:->|to|is|of) -\d[\d.e+-]* kg")
 
 
@@ -108,7 +108,7 @@ def located(line: dict[str, Any]) -> list[tuple[str, str]]:
         if not h["unnamed"]:
             continue
         how, joints = "not said", set(h["joints"])
-        if len(joints) == 1 and any(h["joints"][0] in x and OF_THE_LOG.search(x) for x in said.get("notes", [])):
+        if any(OF_THE_LOG.search(x) and 2 * sum(j in x for j in joints) >= len(joints) for x in said.get("notes", [])):
             how = "noted"
         if any(matches(f, h, ("accept",)) for f in said["findings"]):
             how = "named alike"

@@ -142,6 +142,17 @@ def test_a_torque_channel_out_of_step_is_named_and_corrected(late):
     assert fit["rmse_corrected"] < 1.3 * fit["noise_floor"] and fit["rmse_refit"] > 3.0 * fit["rmse_corrected"]
 
 
+def test_torque_channels_that_are_all_a_little_late_are_noted_and_not_named():
+    robot, case = machine(6, 3, 0.3)
+    late = (0.002, 0.003, 0.004)
+    behind = lambda r: np.stack([np.interp(r.t - d, r.t, x) for d, x in zip(late, r.tau.T, strict=True)], axis=1)  # noqa: E731
+    diagnosis = diagnose(robot, [dataclasses.replace(r, tau=behind(r)) for r in case.recordings]).diagnosis
+    assert not [f for f in diagnosis.findings if f.effect != "time_delay"]
+    (note,) = [note for note in diagnosis.notes if note.startswith("Torque is logged early or late")]
+    for name, delay in zip(robot.joint_names, late, strict=True):
+        assert f"{name} about {1e3 * delay:.0f} ms late" in note
+
+
 def test_the_corrected_model_predicts_other_moves_of_the_machine():
     case, result = diagnosed("stribeck_friction")
     hidden = {k: v["value"] for k, v in case.truth["effects"][0]["parameters"].items()}

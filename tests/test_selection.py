@@ -9,7 +9,7 @@ from scipy import integrate, signal, stats
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
-from irb140_jax.mismatch.regression.gram import LEVELS, ONE, JointGram, log_prior, own_scale
+from irb140_jax.mismatch.regression.gram import LEVELS, ONE, JointGram, log_prior_of_sizes, own_scale
 from irb140_jax.mismatch.regression.noise import correlation_time
 from irb140_jax.mismatch.selection.averages import probabilities
 from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Space
@@ -85,7 +85,8 @@ def test_the_evidence_of_a_set_is_the_density_of_the_data(chosen):
     space, data = planted(1, {0: 1.0, 5: 0.5})
     hyper = (SETTING, (0, 2, 5, ONE))
     widths = [density(space, data, chosen, hyper, w) for w in WIDTHS] + LOG_PRIOR
-    expected = np.logaddexp.reduce(widths) + sum(map(log_prior, hyper)) + len(chosen) * np.log(0.05)
+    sizes = sum(log_prior_of_sizes()[list(own[:-1])].sum() for own in hyper)
+    expected = np.logaddexp.reduce(widths) + sizes + len(chosen) * np.log(0.05)
     assert space.log_evidence(chosen, hyper) == pytest.approx(expected, abs=1e-8)
     assert space.width(chosen, hyper) == WIDTHS[np.argmax(widths)]
 
@@ -192,11 +193,12 @@ def test_without_a_member_that_held_another_ones_shape_in_place_that_one_takes_a
     assert 4 not in Search(space, hyper).run((0, 4))
 
 
-def test_the_prior_of_the_sizes_is_a_probability():
-    every = range(len(settings.DISCREPANCY_SIZES))
-    total = sum(np.exp(log_prior((k, 0, 0, ONE)) - log_prior((0, 0, 0, ONE))) for k in every)
-    first = 2.0 / np.pi * np.arctan(0.5 * settings.DISCREPANCY_SIZES[1] / 0.03)
-    assert total * first == pytest.approx(1.0)
+def test_the_prior_of_the_sizes_is_a_half_cauchy_distribution():
+    prior = np.exp(log_prior_of_sizes())
+    assert prior.sum() == pytest.approx(1.0) and len(prior) == len(settings.DISCREPANCY_SIZES)
+    # Half of it lies below the usual misfit, which is on the grid: within its own cell.
+    usual = settings.DISCREPANCY_SIZES.index(settings.USUAL_MISFIT)
+    assert prior[:usual].sum() < 0.5 < prior[: usual + 1].sum()
 
 
 @pytest.mark.parametrize("misfit", [0.0, 0.5, 0.9])

@@ -13,7 +13,14 @@ from irb140_jax.mismatch.corrected.native import native_gap
 from irb140_jax.mismatch.output import views
 from irb140_jax.mismatch.output.findings import torque_scale_finding
 from irb140_jax.mismatch.output.inertials import link_shifts
-from irb140_jax.mismatch.output.notes import discrepancy_notes, friction_notes, gap_notes, inertial_notes, notes
+from irb140_jax.mismatch.output.notes import (
+    discrepancy_notes,
+    friction_notes,
+    gap_notes,
+    inertial_notes,
+    notes,
+    timing_notes,
+)
 from irb140_jax.mismatch.output.servos import command_notes, harmful_notes, of_servos, servo_sentence
 from irb140_jax.mismatch.output.summary import open_sentence, summary, verdict
 from irb140_jax.mismatch.records import rounded
@@ -145,11 +152,12 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     robot, judged = of.data.robot, of.proof.judged
     gap = None if of.beyond is None else native_gap(of.beyond, of.data.band)
     lacking = list(dict.fromkeys(n.effect.title for n in of.model.named if n.effect.export.not_in_mjcf))
+    servo = of.data.servo
+    clocks = timing_notes(of.ex) if servo is None else command_notes(of.ex, servo)
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
     return [
         *of.data.servo_notes, *harmful_notes(robot, of.harmful), *open_joints,
         *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names),
-        *discrepancy_notes(robot, of.proof), *command_notes(of.ex, of.data.servo),
-        *coarse_positions(robot, *of.sensors, judged), *of.data.notes, *notes(of.data, of.uncertainty, judged),
-        *gap_notes(robot, gap, torque, lacking),
+        *clocks, *discrepancy_notes(robot, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
+        *notes(of.data, of.uncertainty, judged), *gap_notes(robot, gap, torque, lacking),
     ]  # fmt: skip

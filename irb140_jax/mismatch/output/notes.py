@@ -3,15 +3,18 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import stats
 
+from irb140_jax.effects import At
 from irb140_jax.mismatch import settings
-from irb140_jax.mismatch.regression.nuisances import SCALED
+from irb140_jax.mismatch.regression.nuisances import FIXED, SCALED
 from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.robot import Robot
 
 FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
+DELAY, DELAYS = FIXED.index("delay"), (settings.DELAY_COMMON, settings.DELAY_JOINT)
 
 
 def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]:
@@ -102,6 +105,33 @@ def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
             joint = ex.lib.robot.joint_names[j]
             out.append(f"The friction of {joint} differs between the recordings; relative to their mean: {said}.")
     return out
+
+
+def timing_notes(ex: Explanation) -> list[str]:
+    """A note where torque is logged early or late beside the positions, and no effect is named for it.
+
+    A channel is listed where that is more probable than no error of its time (Savage and Dickey), against the odds of
+    any rare effect.
+    """
+    space, named = ex.space, {j for c in ex.members if c.effect.place.at is At.LOG_TIMING for j in c.joints}
+    mean, cov = space.posterior(ex.chosen, ex.hyper)
+    columns, common, width = space.set_columns(ex.chosen), space.inertials + 1, np.hypot(*DELAYS)
+    off = []
+    for j, of_joint in enumerate(ex.hyper):
+        integrated, at = space.joints[j].at(of_joint), space.places[j][columns]
+        own = integrated.own()[DELAY]
+        by_shared = np.where(at >= 0, -DELAYS[1] * own[at], 0.0)
+        by_shared[common] += DELAYS[0]
+        early = float(by_shared @ mean + DELAYS[1] * own[-1])
+        unsure = float(np.hypot(np.sqrt(by_shared @ cov @ by_shared), DELAYS[1] * integrated.spread()[DELAY]))
+        odds = stats.norm.logpdf(0.0, 0.0, width) - stats.norm.logpdf(0.0, early, unsure) + np.log(settings.RARE)
+        if j not in named and odds > 0.0 and abs(early) > settings.NOTABLE_DELAY:
+            way = "early" if early > 0.0 else "late"
+            # To one digit: of a shift in time, the fit knows the slope of the torque alone.
+            off.append(f"{ex.lib.robot.joint_names[j]} about {1e3 * abs(early):.1g} ms {way}")
+    if not off:
+        return []
+    return [f"Torque is logged early or late beside the positions: {', '.join(off)}. The fit allows for it."]
 
 
 def discrepancy_notes(robot: Robot, proof: HeldOut) -> list[str]:

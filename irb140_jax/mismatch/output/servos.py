@@ -108,14 +108,12 @@ def of_servos(ex: Explanation, servo: Commanded | None, found: list[Finding]) ->
     return out
 
 
-def command_notes(ex: Explanation, servo: Commanded | None) -> list[str]:
+def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     """A note for every servo that applies its commands late, or whose torque lags as much.
 
     Its odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
     any rare effect.
     """
-    if servo is None:
-        return []
     out = []
     for j in range(ex.lib.robot.n):
         own, spread = (x[COMMAND_DELAY] for x in _joint_nuisances(ex, j))

@@ -7,9 +7,11 @@ effects and y; sums of those over joints are all that a search needs.
 """
 
 import dataclasses
+import functools
 
 import numpy as np
 from scipy import linalg
+from scipy.linalg import lapack
 
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.nuisances import SCALED
@@ -24,12 +26,11 @@ JointHyper = tuple[int, ...]
 START: JointHyper = (*([3] * len(SCALED)), ONE)
 
 
-def log_prior(hyper: JointHyper) -> float:
-    """Log prior of the sizes of a joint's discrepancy, half-Cauchy over the grid."""
+def log_prior_of_sizes() -> np.ndarray:
+    """Log prior of each size of a block of the discrepancy, half-Cauchy over the grid."""
     edges = np.sqrt(np.multiply(settings.DISCREPANCY_SIZES[1:-1], settings.DISCREPANCY_SIZES[2:]))
     edges = np.concatenate([[0.0, settings.DISCREPANCY_SIZES[1] / 2.0], edges, [np.inf]])
-    mass = np.diff(np.arctan(edges / settings.USUAL_MISFIT)) * 2.0 / np.pi
-    return float(np.log(mass[list(hyper[:-1])]).sum())
+    return np.log(np.diff(np.arctan(edges / settings.USUAL_MISFIT)) * 2.0 / np.pi)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,7 +43,9 @@ class Integrated:
         used: Own columns that may differ from zero.
         scale: Their prior standard deviations.
         chol: Cholesky factor of their precision, in units of those.
-        half: What integrating them out takes off the Gram matrix of shared columns and y, half.T @ half.
+        halves: Of each shared column and y what integrating them out takes off products with it: H with H[a] . H[b],
+            shape (k + 1, used).  Made where it is asked for: a search asks for a tenth of them.
+        made: Which of these are, shape (k + 1,).
         constant: What the joint adds to the log evidence besides: log determinants, noise level and prior of the sizes.
     """
 
@@ -51,32 +54,50 @@ class Integrated:
     used: np.ndarray
     scale: np.ndarray
     chol: np.ndarray
-    half: np.ndarray
-    constant: float
+    halves: np.ndarray
+    made: np.ndarray
+    constant: float = 0.0
+
+    @functools.cached_property
+    def first(self) -> int:
+        """Where the shared columns begin in the Gram matrix."""
+        return len(self.gram) - len(self.made)
+
+    def half(self, columns: np.ndarray) -> np.ndarray:
+        """What integrating out takes off products with some shared columns, by rows."""
+        if len(self.used) and not self.made[columns].all():
+            new = columns[~self.made[columns]]
+            products = self.scale[:, None] * self.gram[self.used[:, None], new + self.first] / self.level**2
+            solved, _ = lapack.dtrtrs(self.chol, products, lower=1)  # pyright: ignore[reportAttributeAccessIssue]
+            self.halves[new] = solved.T
+            self.made[new] = True
+        return self.halves[columns]
 
     def left(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Gram matrix of some shared columns with others, as numbered in `JointGram.index`."""
-        first = len(self.gram) - self.half.shape[1]
-        square = self.gram[np.ix_(rows + first, columns + first)] / self.level**2
-        return square - self.half[:, rows].T @ self.half[:, columns]
+        square = self.gram[rows[:, None] + self.first, columns + self.first] / self.level**2
+        half = self.half(rows)
+        return square - half @ (half if rows is columns else self.half(columns)).T
 
     def blocks(self, groups: np.ndarray) -> np.ndarray:
         """Such Gram matrices of small groups of columns (m, k), shape (m, k, k); -1 stands for a column of zeros."""
-        at, there = groups + len(self.gram) - self.half.shape[1], groups >= 0
+        there, groups = groups >= 0, np.maximum(groups, 0)
+        self.half(np.unique(groups))
+        at, part = groups + self.first, self.halves[groups]
         G = self.gram[at[:, :, None], at[:, None, :]] / self.level**2
-        part = np.moveaxis(self.half[:, groups], 0, 1)
-        G = G - np.swapaxes(part, 1, 2) @ part
+        G = G - part @ np.swapaxes(part, 1, 2)
         return np.where(there[:, :, None] & there[:, None, :], G, 0.0)
 
     def own(self) -> np.ndarray:
         """Mean of the own columns per unit of each shared column and of y, shape (D, k + 1)."""
-        out = np.zeros((len(self.gram) - self.half.shape[1], self.half.shape[1]))
-        out[self.used] = self.scale[:, None] * linalg.solve_triangular(self.chol, self.half, lower=True, trans=1)
+        out = np.zeros((self.first, len(self.made)))
+        half = self.half(np.arange(len(self.made)))
+        out[self.used] = self.scale[:, None] * linalg.solve_triangular(self.chol, half.T, lower=True, trans=1)
         return out
 
     def spread(self) -> np.ndarray:
         """Standard deviation of the own columns' coefficients beside shared ones that are known, shape (D,)."""
-        out = np.zeros(len(self.gram) - self.half.shape[1])
+        out = np.zeros(self.first)
         inverse = linalg.solve_triangular(self.chol, np.eye(len(self.used)), lower=True)
         out[self.used] = self.scale * np.sqrt(np.sum(inverse**2, axis=0))
         return out
@@ -111,6 +132,7 @@ class JointGram:
         alike = {int(k): (self.keep & (self.repeats == k)).astype(float) for k in np.unique(self.repeats[self.keep])}
         self._totals = [(k, _sum(blocks, w), float(w @ rows)) for k, w in alike.items()]
         self._once = self._totals[0][1:] if self._totals else (np.zeros(blocks.shape[1:]), 0.0)
+        self._log_prior = log_prior_of_sizes()
         self._kept: dict[tuple[JointHyper, bool], Integrated] = {}
 
     def without(self, blocks: np.ndarray) -> "JointGram":
@@ -163,11 +185,11 @@ class JointGram:
         total, rows = self.weighted(level)
         s = size[used]
         M = s[:, None] * total[np.ix_(used, used)] * s / level**2 + np.eye(len(used))
-        chol = linalg.cholesky(M, lower=True, check_finite=False)
-        half = linalg.solve_triangular(chol, s[:, None] * total[used, D:] / level**2, lower=True, check_finite=False)
-        left = total[-1, -1] / level**2 - half[:, -1] @ half[:, -1]
+        chol, k = linalg.cholesky(M, lower=True, check_finite=False), len(total) - D
+        out = Integrated(total, level, used, s, chol, np.empty((k, len(used))), np.zeros(k, dtype=bool))
+        left = float(out.left(np.array([k - 1]), np.array([k - 1]))[0, 0])
         constant = -float(np.log(np.diag(chol)).sum()) - rows * np.log(level) - 0.5 * left
-        return Integrated(total, level, used, s, chol, half, constant + log_prior(hyper))
+        return dataclasses.replace(out, constant=constant + float(self._log_prior[list(hyper[:-1])].sum()))
 
 
 def _sum(blocks: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -122,10 +122,13 @@ class Space:
         """
         H = np.zeros((len(rows), len(columns)))
         for j in range(len(self.joints)) if only is None else only:
-            across, down = self.places[j][rows], self.places[j][columns]
-            r, c = np.flatnonzero(across >= 0), np.flatnonzero(down >= 0)
+            at = self.places[j]
+            r = np.flatnonzero(at[rows] >= 0)
+            c = r if columns is rows else np.flatnonzero(at[columns] >= 0)
             if len(r) and len(c):
-                H[np.ix_(r, c)] += self.joints[j].at(hyper[j], instrument).left(across[r], down[c])
+                across = at[rows[r]]
+                down = across if c is r else at[columns[c]]
+                H[r[:, None], c] += self.joints[j].at(hyper[j], instrument).left(across, down)
         return H
 
     def with_y(self, columns: np.ndarray) -> np.ndarray:
@@ -279,20 +282,21 @@ class Space:
 
     def _climbed(self, index: np.ndarray, hyper: Hyper, j: int, prior: np.ndarray) -> Hyper:
         """Hyperparameters, those of one joint at their best beside a set whose columns have these prior widths."""
-        gram = self.joints[j]
-        rest = self.gram(hyper, index, index, [i for i in range(len(self.joints)) if i != j])
-        at = self.places[j][index]
-        mine = np.flatnonzero(at >= 0)
-        into, take = np.ix_(mine, mine), at[mine]
+        gram, at = self.joints[j], self.places[j][index]
+        mine, others = np.flatnonzero(at >= 0), np.flatnonzero(at < 0)
+        scale, elsewhere = np.append(prior, 1.0), [i for i in range(len(self.joints)) if i != j]
+        M = with_prior(scale[:, None] * self.gram(hyper, index, index, elsewhere) * scale)
+        # Columns that don't move this joint are eliminated once.
+        half = linalg.solve_triangular(root(M[others[:, None], others]), M[others[:, None], mine], lower=True)
+        rest, take, scale = M[mine[:, None], mine] - half.T @ half, at[mine], scale[mine]
         known: dict[JointHyper, float] = {}
 
         def values(tries: list[JointHyper]) -> None:
-            new = [s for s in tries if s not in known]
-            H = np.repeat(rest[None], len(new), axis=0)
-            for k, s in enumerate(new):
-                H[k][into] += gram.at(s).left(take, take)
-            for s, value in zip(new, _log_evidences(H, prior) if new else (), strict=True):
-                known[s] = gram.at(s).constant + float(value)
+            if new := [s for s in tries if s not in known]:
+                own = np.stack([scale[:, None] * gram.at(s).left(take, take) * scale for s in new])
+                diagonal = _diagonals(rest + own)
+                value = 0.5 * (own[:, -1, -1] - diagonal[:, -1] ** 2) - np.log(diagonal[:, :-1]).sum(axis=1)
+                known.update(zip(new, value + [gram.at(s).constant for s in new], strict=True))
 
         now = hyper[j]
         while True:
@@ -410,9 +414,14 @@ def _log_evidences(H: np.ndarray, prior: np.ndarray) -> np.ndarray:
     """
     scale = np.pad(prior, [(0, 0)] * (prior.ndim - 1) + [(0, 1)], constant_values=1.0)
     M = with_prior(H * (scale[..., :, None] * scale[..., None, :]))
-    try:
-        diagonal = np.diagonal(np.linalg.cholesky(M), axis1=1, axis2=2)
-    except np.linalg.LinAlgError:
-        diagonal = np.array([np.diag(root(m)) for m in M])
+    diagonal = _diagonals(M)
     explained = M[:, -1, -1] - diagonal[:, -1] ** 2
     return 0.5 * explained - np.log(diagonal[:, :-1]).sum(axis=1)
+
+
+def _diagonals(M: np.ndarray) -> np.ndarray:
+    """Diagonals of the Cholesky factors of matrices (b, k, k), shape (b, k)."""
+    try:
+        return np.diagonal(np.linalg.cholesky(M), axis1=1, axis2=2)
+    except np.linalg.LinAlgError:
+        return np.array([np.diag(root(m)) for m in M])
