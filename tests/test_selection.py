@@ -13,7 +13,9 @@ from irb140_jax.mismatch.regression.gram import LEVELS, ONE, JointGram, log_prio
 from irb140_jax.mismatch.regression.noise import correlation_time
 from irb140_jax.mismatch.selection.averages import probabilities
 from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Space
+from irb140_jax.mismatch.selection.hyperparameters import over_shapes, settled
 from irb140_jax.mismatch.selection.kinds import Kinds
+from irb140_jax.mismatch.selection.screening import gains, reshaped
 from irb140_jax.mismatch.selection.search import Search
 
 ROWS, INERTIALS, COMMON, OWN = 60, 3, 1, 5
@@ -97,7 +99,7 @@ def test_screening_says_what_the_evidence_says_at_the_width_of_the_inertials_of_
     width = space.width((2,), hyper)
     before = density(space, data, (2,), hyper, width)
     expected = [density(space, data, (2, int(i)), hyper, width) - before + np.log(0.05) for i in which]
-    np.testing.assert_allclose(space.gains((2,), hyper, which), expected, atol=1e-8)
+    np.testing.assert_allclose(gains(space, (2,), hyper, which), expected, atol=1e-8)
 
 
 def test_the_prior_of_the_widths_is_a_probability():
@@ -145,7 +147,7 @@ def test_the_posterior_is_that_of_the_data():
 
 def test_settings_that_are_settled_have_no_better_neighbour_one_step_away():
     space, _ = planted(4, {0: 2.0})
-    value, hyper = space.settled((0,), (SETTING, SETTING))
+    value, hyper = settled(space, (0,), (SETTING, SETTING))
     assert value == pytest.approx(space.log_evidence((0,), hyper))
     for j in range(2):
         for axis in range(len(SETTING)):
@@ -175,7 +177,7 @@ def test_amplitudes_that_are_not_admissible_make_a_set_impossible():
     lowest[0] = 10.0
     bounded = dataclasses.replace(space, lowest=lowest)
     assert bounded.log_evidence((0,), (SETTING, SETTING)) == -np.inf
-    assert bounded.gains((), (SETTING, SETTING), np.array([0]))[0] == -np.inf
+    assert gains(bounded, (), (SETTING, SETTING), np.array([0]))[0] == -np.inf
     assert 0 not in Search(bounded, (SETTING, SETTING)).run()
 
 
@@ -189,7 +191,7 @@ def test_without_a_member_that_held_another_ones_shape_in_place_that_one_takes_a
     space = dataclasses.replace(space, candidates=tuple(candidates), lowest=lowest)
     hyper = (SETTING, SETTING)
     assert space.log_evidence((0, 4), hyper) == -np.inf
-    assert space.reshaped((0, 4), hyper) == (0, 5) and space.reshaped((0, 5), hyper) == (0, 5)
+    assert reshaped(space, (0, 4), hyper) == (0, 5) and reshaped(space, (0, 5), hyper) == (0, 5)
     assert 4 not in Search(space, hyper).run((0, 4))
 
 
@@ -240,8 +242,8 @@ def test_a_sets_shapes_are_summed_over_one_member_at_a_time():
         values = [density(space, data, s, hyper, width) for s in (*sets, chosen)]
         expected += np.logaddexp.reduce(values[:-1]) - values[-1]
     assert expected > 0.0
-    assert space.over_shapes(chosen, hyper) == pytest.approx(expected, abs=1e-8)
-    assert space.over_shapes((0,), hyper) == 0.0
+    assert over_shapes(space, chosen, hyper) == pytest.approx(expected, abs=1e-8)
+    assert over_shapes(space, (0,), hyper) == 0.0
 
 
 def test_blocks_left_out_are_as_if_they_had_not_been_recorded():

@@ -85,6 +85,14 @@ def root(M: np.ndarray) -> np.ndarray:
         return (R * np.sign(np.diag(R))[:, None]).T
 
 
+def cholesky_diagonals(M: np.ndarray) -> np.ndarray:
+    """Diagonals of the Cholesky factors of matrices (b, k, k), shape (b, k)."""
+    try:
+        return np.diagonal(np.linalg.cholesky(M), axis1=1, axis2=2)
+    except np.linalg.LinAlgError:
+        return np.array([np.diag(root(m)) for m in M])
+
+
 def eliminated(H: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:
     """Gram matrix after marginalising some columns (unit prior), and the log determinant that this costs."""
     if len(columns) == 0:

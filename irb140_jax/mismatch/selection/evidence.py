@@ -11,8 +11,8 @@ from irb140_jax.effects import At
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.beside import Beside
 from irb140_jax.mismatch.columns.candidates import Candidate
-from irb140_jax.mismatch.regression.gaussian import posterior, root, with_prior
-from irb140_jax.mismatch.regression.gram import LEVELS, JointGram, JointHyper
+from irb140_jax.mismatch.regression.gaussian import cholesky_diagonals, posterior, root, with_prior
+from irb140_jax.mismatch.regression.gram import JointGram, JointHyper
 from irb140_jax.mismatch.selection.kinds import Kinds
 
 Hyper = tuple[JointHyper, ...]  # hyperparameters, one a joint
@@ -229,50 +229,13 @@ class Space:
         own, at = self.joints[joint].at(of_joint, instrument).own(), self.places[joint][columns]
         return own[:, -1] - own[:, at[at >= 0]] @ mean[at >= 0]
 
-    def settled(
-        self, chosen: Sequence[int], hyper: Hyper, joints: Sequence[int] | None = None
-    ) -> tuple[float, Hyper]:
-        """Sizes and levels that are best for a set, by ascent on their grids, at some joints or all.
-
-        Returns:
-            Log posterior of the set, summed over shapes, -inf where it is inadmissible; and the hyperparameters.
-        """
-        joints = range(len(self.joints)) if joints is None else joints
-        index = self.with_y(self.set_columns(chosen))
-        moved = True
-        while moved:
-            moved = False
-            prior = self.prior(chosen, hyper)
-            for j in joints:
-                better = self._climbed(index, hyper, j, prior)
-                moved |= better != hyper and len(joints) > 1
-                hyper = better
-        return self.log_evidence(chosen, hyper) + self.over_shapes(chosen, hyper), hyper
-
-    def over_shapes(self, chosen: Sequence[int], hyper: Hyper) -> float:
-        """What a set's log posterior gains where the shapes of its members are summed over instead of the best ones.
-
-        One member at a time, the others' shapes as they are.
-        """
-        out = 0.0
-        for c in chosen:
-            if len(alike := self._alike[c]) > 1:
-                rest = tuple(i for i in chosen if i != c)
-                near = frozenset(i for i in rest if self.at_joint[list(self.candidates[c].joints), i].any())
-                key = c, near, tuple(hyper[j] for j in self.candidates[c].joints)
-                if key not in self._summed:
-                    gains = self.gains(rest, hyper, np.array(alike))
-                    own = gains[alike.index(c)]
-                    self._summed[key] = float(special.logsumexp(gains) - own) if np.isfinite(own) else 0.0
-                out += self._summed[key]
-        return out
-
     @cached_property
-    def _summed(self) -> dict[tuple, float]:
+    def summed(self) -> dict[tuple, float]:
+        """What sums over shapes gain, as far as they are known: see `hyperparameters.over_shapes`."""
         return {}
 
     @cached_property
-    def _alike(self) -> list[list[int]]:
+    def alike(self) -> list[list[int]]:
         """Candidates that differ from each one in shape alone, itself included."""
         groups: dict[tuple, list[int]] = {}
         keys = [(c.slug, c.joints, c.variant) for c in self.candidates]
@@ -280,47 +243,10 @@ class Space:
             groups.setdefault(key, []).append(i)
         return [groups[key] for key in keys]
 
-    def _climbed(self, index: np.ndarray, hyper: Hyper, j: int, prior: np.ndarray) -> Hyper:
-        """Hyperparameters, those of one joint at their best beside a set whose columns have these prior widths."""
-        gram, at = self.joints[j], self.places[j][index]
-        mine, others = np.flatnonzero(at >= 0), np.flatnonzero(at < 0)
-        scale, elsewhere = np.append(prior, 1.0), [i for i in range(len(self.joints)) if i != j]
-        M = with_prior(scale[:, None] * self.gram(hyper, index, index, elsewhere) * scale)
-        # Columns that don't move this joint are eliminated once.
-        half = linalg.solve_triangular(root(M[others[:, None], others]), M[others[:, None], mine], lower=True)
-        rest, take, scale = M[mine[:, None], mine] - half.T @ half, at[mine], scale[mine]
-        known: dict[JointHyper, float] = {}
-
-        def values(tries: list[JointHyper]) -> None:
-            if new := [s for s in tries if s not in known]:
-                own = np.stack([scale[:, None] * gram.at(s).left(take, take) * scale for s in new])
-                diagonal = _diagonals(rest + own)
-                value = 0.5 * (own[:, -1, -1] - diagonal[:, -1] ** 2) - np.log(diagonal[:, :-1]).sum(axis=1)
-                known.update(zip(new, value + [gram.at(s).constant for s in new], strict=True))
-
-        now = hyper[j]
-        while True:
-            near = _near(now, gram.lowest)
-            values([now, *near])
-            best = max(near, key=lambda s: known[s])
-            if known[best] <= known[now] + LEAST:
-                return (*hyper[:j], now, *hyper[j + 1 :])
-            now = best
-
     def inadmissible(self, chosen: Sequence[int], hyper: Hyper) -> list[int]:
         """Members of a set whose amplitudes are not such as can be."""
         every = self.with_y(self.set_columns(chosen))
         return self._impossible(chosen, self.gram(hyper, every, every), self.prior(chosen, hyper))
-
-    def reshaped(self, chosen: Sequence[int], hyper: Hyper) -> tuple[int, ...]:
-        """The set with the best other shape for each member whose amplitudes can't be at its own, if there is one."""
-        now = list(chosen)
-        for c in self.inadmissible(chosen, hyper):
-            rest = tuple(i for i in now if i != c)
-            gains = self.gains(rest, hyper, np.array(self._alike[c]))
-            if np.isfinite(gains).any():
-                now = [*rest, self._alike[c][int(np.argmax(gains))]]
-        return tuple(sorted(now))
 
     def _impossible(self, chosen: Sequence[int], H: np.ndarray, prior: np.ndarray) -> list[int]:
         """The same, from the Gram matrix of a set's columns and y, and the columns' prior widths."""
@@ -330,70 +256,13 @@ class Space:
         mean = linalg.cho_solve((root(G), True), prior * H[:-1, -1])[self.offset :]
         ends = np.cumsum([len(self.columns[c]) for c in chosen])
         parts = [mean[e - len(self.columns[c]) : e] for c, e in zip(chosen, ends, strict=True)]
-        return [c for c, part in zip(chosen, parts, strict=True) if self._outside(np.array([c]), part[None])[0]]
+        return [c for c, part in zip(chosen, parts, strict=True) if self.outside(np.array([c]), part[None])[0]]
 
-    def _outside(self, which: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    def outside(self, which: np.ndarray, mean: np.ndarray) -> np.ndarray:
         """Which candidates' amplitudes (candidates, k) are inadmissible."""
         k = mean.shape[1]
         bad = np.any((mean < self.lowest[which, :k] - 1e-9) | (mean > self.highest[which, :k] + 1e-9), axis=1)
         return bad | (np.sum(mean * self.weights[which, :k], axis=1) < self.least[which])
-
-    def near(self, chosen: Sequence[int], hyper: Hyper, columns: np.ndarray) -> np.ndarray:
-        """Gram matrix of some shared columns and y, inertials, nuisances and a set integrated out."""
-        base, extra, prior = self.set_columns(chosen), self.with_y(columns), self.prior(chosen, hyper)
-        chol = root(with_prior(self.gram(hyper, base, base) * np.outer(prior, prior)))
-        across = prior[:, None] * self.gram(hyper, base, extra)
-        half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
-        return self.gram(hyper, extra, extra) - half.T @ half
-
-    def gains(self, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) -> np.ndarray:
-        """Log posterior odds of adding each of some candidates to a set; -inf if inadmissible."""
-        out = np.full(len(which), -np.inf)
-        if not len(which):
-            return out
-        extra = np.unique(np.concatenate([self.columns[i] for i in which]))
-        number = np.full(self.size, -1)
-        number[extra] = np.arange(len(extra))
-        base, prior = self.set_columns(chosen), self.prior(chosen, hyper)
-        more = self.kinds.one_more(chosen)
-        chol = root(with_prior(self.gram(hyper, base, base) * np.outer(prior, prior)))
-        across = prior[:, None] * self.gram(hyper, base, self.with_y(extra))
-        half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
-        with_y = self.gram(hyper, extra, np.array([self.size]))[:, 0] - half[:, :-1].T @ half[:, -1]
-        by_size: dict[int, list[int]] = {}
-        for m, i in enumerate(which):
-            by_size.setdefault(len(self.columns[i]), []).append(m)
-        for k, members in by_size.items():
-            columns = np.array([self.columns[which[m]] for m in members])
-            at = number[columns]
-            part = half[:, at]
-            each = np.moveaxis(part, 0, 1)
-            M = np.eye(k) - np.swapaxes(each, 1, 2) @ each
-            for g, of_joint, place in zip(self.joints, hyper, self.places, strict=True):
-                mine = place[columns]
-                moved = np.flatnonzero((mine >= 0).any(axis=1))
-                if len(moved):
-                    M[moved] += g.at(of_joint).blocks(mine[moved])
-            rhs = with_y[at]
-            mean = np.linalg.solve(M, rhs[..., None])[..., 0]
-            gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
-            ids = which[members]
-            out[members] = np.where(self._outside(ids, mean), -np.inf, gain + self.log_prior[ids] + more[ids])
-        return out
-
-
-LEAST = 1e-3  # nats that a step of a size or a level must gain
-
-
-def _near(hyper: JointHyper, lowest: int) -> list[JointHyper]:
-    """Neighbours on the grid, with no level below the lowest."""
-    bounds = [*([(0, len(settings.DISCREPANCY_SIZES))] * (len(hyper) - 1)), (lowest, len(LEVELS))]
-    out = []
-    for axis, (bottom, top) in enumerate(bounds):
-        for step in (-1, 1):
-            if bottom <= hyper[axis] + step < top:
-                out.append((*hyper[:axis], hyper[axis] + step, *hyper[axis + 1 :]))
-    return out
 
 
 def _width_evidences(H: np.ndarray, inertials: int) -> np.ndarray:
@@ -414,14 +283,6 @@ def _log_evidences(H: np.ndarray, prior: np.ndarray) -> np.ndarray:
     """
     scale = np.pad(prior, [(0, 0)] * (prior.ndim - 1) + [(0, 1)], constant_values=1.0)
     M = with_prior(H * (scale[..., :, None] * scale[..., None, :]))
-    diagonal = _diagonals(M)
+    diagonal = cholesky_diagonals(M)
     explained = M[:, -1, -1] - diagonal[:, -1] ** 2
     return 0.5 * explained - np.log(diagonal[:, :-1]).sum(axis=1)
-
-
-def _diagonals(M: np.ndarray) -> np.ndarray:
-    """Diagonals of the Cholesky factors of matrices (b, k, k), shape (b, k)."""
-    try:
-        return np.diagonal(np.linalg.cholesky(M), axis1=1, axis2=2)
-    except np.linalg.LinAlgError:
-        return np.array([np.diag(root(m)) for m in M])

@@ -16,6 +16,8 @@ from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
+from irb140_jax.mismatch.selection.hyperparameters import settled
+from irb140_jax.mismatch.selection.screening import gains, near, reshaped
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,14 +78,14 @@ class Explanation:
         Without a member, others may have another shape.
         """
         value, members = -np.inf, tuple(sorted(chosen))
-        for other in dict.fromkeys((members, self.space.reshaped(members, self.hyper))):
+        for other in dict.fromkeys((members, reshaped(self.space, members, self.hyper))):
             known = self.sets.get(frozenset(other))
-            value = max(value, self.space.settled(other, self.hyper, joints)[0] if known is None else known)
+            value = max(value, settled(self.space, other, self.hyper, joints)[0] if known is None else known)
         return value
 
     def gains(self, chosen: tuple[int, ...], which: Sequence[int]) -> np.ndarray:
         """Log posterior odds of adding each of some candidates to a set, -inf where inadmissible."""
-        return self.space.gains(chosen, self.hyper, np.asarray(which, dtype=int))
+        return gains(self.space, chosen, self.hyper, np.asarray(which, dtype=int))
 
     def near(self, chosen: tuple[int, ...], columns: np.ndarray) -> np.ndarray:
         """Gram matrix of some amplitudes' columns and y; inertials, nuisances and a set's amplitudes integrated out.
@@ -92,7 +94,7 @@ class Explanation:
             chosen: The set.
             columns: Columns of amplitudes, numbered from the first amplitude.
         """
-        return self.space.near(chosen, self.hyper, columns + self.space.offset)
+        return near(self.space, chosen, self.hyper, columns + self.space.offset)
 
     def posterior(
         self, chosen: tuple[int, ...] | None = None, without: np.ndarray | None = None, *, instrument: bool = True

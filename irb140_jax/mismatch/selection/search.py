@@ -8,6 +8,8 @@ import numpy as np
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
+from irb140_jax.mismatch.selection.hyperparameters import settled
+from irb140_jax.mismatch.selection.screening import gains, reshaped
 
 BEST = 3  # candidates of different kinds that a screening passes on to be judged in full
 LEAST = 1e-2  # nats that a move must gain
@@ -40,7 +42,7 @@ class Search:
         key = frozenset(chosen)
         if key not in self.visited:
             at = sorted(set(joints)) if joints is not None else None
-            self.visited[key] = self.space.settled(tuple(sorted(key)), hyper, at)
+            self.visited[key] = settled(self.space, tuple(sorted(key)), hyper, at)
         return self.visited[key][0]
 
     def run(self, chosen: Iterable[int] = (), *, every_move: bool = True) -> tuple[int, ...]:
@@ -62,7 +64,7 @@ class Search:
                 for move in moves:
                     while (better := move(now)) != now:
                         now, moving = better, True
-                        self.visited[now] = self.space.settled(tuple(sorted(now)), self.visited[now][1])
+                        self.visited[now] = settled(self.space, tuple(sorted(now)), self.visited[now][1])
             # What was tried in vain beside other sets at other joints counts in the averages beside this one.
             self._in_vain.clear()
             self._screened.clear()
@@ -91,7 +93,7 @@ class Search:
         while not np.isfinite(self.judged(chosen, hyper, joints)):
             seen.add(chosen)
             members, at = tuple(sorted(chosen)), self.visited[chosen][1]
-            other = frozenset(self.space.reshaped(members, at))
+            other = frozenset(reshaped(self.space, members, at))
             if other in seen:
                 other = chosen - set(self.space.inadmissible(members, at))
             if other in seen:
@@ -140,7 +142,7 @@ class Search:
         for trial in dict.fromkeys((hyper, lower, lowest)):
             base = space.log_evidence(tuple(chosen), trial)
             if np.isfinite(base):
-                best = np.maximum(best, base + space.gains(tuple(chosen), trial, which))
+                best = np.maximum(best, base + gains(space, tuple(chosen), trial, which))
         kinds: dict[tuple[str, tuple[int, ...]], tuple[float, int]] = {}
         for k in np.argsort(-best):
             c = space.candidates[which[k]]

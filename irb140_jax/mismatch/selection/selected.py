@@ -11,6 +11,7 @@ from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals, ri
 from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, in_its_place
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
+from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.search import Search
 
 FREE = (*([len(settings.DISCREPANCY_SIZES) - 1] * (len(START) - 1)), START[-1])  # a discrepancy of any size
@@ -54,7 +55,7 @@ def named(space: Space, best: tuple[int, ...], hyper: Hyper, sets: Sets) -> tupl
     even = [s for s, value in sets.items() if value > least and not s < top]
     few = tuple(sorted(min(even, key=lambda s: (len(s), -sets[s]))))
     sure = tuple(i for i in few if in_its_place(space.candidates, sets, few, i)[1] >= settings.NAMED)
-    return sure, hyper if sure == best else space.settled(sure, hyper)[1]
+    return sure, hyper if sure == best else settled(space, sure, hyper)[1]
 
 
 def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:

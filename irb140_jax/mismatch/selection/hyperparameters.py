@@ -1,0 +1,93 @@
+"""Sizes of the discrepancy and noise levels that are best for a set, and the sum over its members' shapes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import linalg, special
+
+from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.regression.gaussian import cholesky_diagonals, root, with_prior
+from irb140_jax.mismatch.regression.gram import LEVELS, JointHyper
+from irb140_jax.mismatch.selection.evidence import Hyper, Space
+from irb140_jax.mismatch.selection.screening import gains
+
+LEAST = 1e-3  # nats that a step of a size or a level must gain
+
+
+def settled(
+    space: Space, chosen: Sequence[int], hyper: Hyper, joints: Sequence[int] | None = None
+) -> tuple[float, Hyper]:
+    """Sizes and levels that are best for a set, by ascent on their grids, at some joints or all.
+
+    Returns:
+        Log posterior of the set, summed over shapes, -inf where it is inadmissible; and the hyperparameters.
+    """
+    joints = range(len(space.joints)) if joints is None else joints
+    index = space.with_y(space.set_columns(chosen))
+    moved = True
+    while moved:
+        moved = False
+        prior = space.prior(chosen, hyper)
+        for j in joints:
+            better = _climbed(space, index, hyper, j, prior)
+            moved |= better != hyper and len(joints) > 1
+            hyper = better
+    return space.log_evidence(chosen, hyper) + over_shapes(space, chosen, hyper), hyper
+
+
+def over_shapes(space: Space, chosen: Sequence[int], hyper: Hyper) -> float:
+    """What a set's log posterior gains where the shapes of its members are summed over instead of the best ones.
+
+    One member at a time, the others' shapes as they are.
+    """
+    out = 0.0
+    for c in chosen:
+        if len(alike := space.alike[c]) > 1:
+            rest = tuple(i for i in chosen if i != c)
+            near = frozenset(i for i in rest if space.at_joint[list(space.candidates[c].joints), i].any())
+            key = c, near, tuple(hyper[j] for j in space.candidates[c].joints)
+            if key not in space.summed:
+                gained = gains(space, rest, hyper, np.array(alike))
+                own = gained[alike.index(c)]
+                space.summed[key] = float(special.logsumexp(gained) - own) if np.isfinite(own) else 0.0
+            out += space.summed[key]
+    return out
+
+
+def _climbed(space: Space, index: np.ndarray, hyper: Hyper, j: int, prior: np.ndarray) -> Hyper:
+    """Hyperparameters, those of one joint at their best beside a set whose columns have these prior widths."""
+    gram, at = space.joints[j], space.places[j][index]
+    mine, others = np.flatnonzero(at >= 0), np.flatnonzero(at < 0)
+    scale, elsewhere = np.append(prior, 1.0), [i for i in range(len(space.joints)) if i != j]
+    M = with_prior(scale[:, None] * space.gram(hyper, index, index, elsewhere) * scale)
+    # Columns that don't move this joint are eliminated once.
+    half = linalg.solve_triangular(root(M[others[:, None], others]), M[others[:, None], mine], lower=True)
+    rest, take, scale = M[mine[:, None], mine] - half.T @ half, at[mine], scale[mine]
+    known: dict[JointHyper, float] = {}
+
+    def values(tries: list[JointHyper]) -> None:
+        if new := [s for s in tries if s not in known]:
+            own = np.stack([scale[:, None] * gram.at(s).left(take, take) * scale for s in new])
+            diagonal = cholesky_diagonals(rest + own)
+            value = 0.5 * (own[:, -1, -1] - diagonal[:, -1] ** 2) - np.log(diagonal[:, :-1]).sum(axis=1)
+            known.update(zip(new, value + [gram.at(s).constant for s in new], strict=True))
+
+    now = hyper[j]
+    while True:
+        near = _near(now, gram.lowest)
+        values([now, *near])
+        best = max(near, key=lambda s: known[s])
+        if known[best] <= known[now] + LEAST:
+            return (*hyper[:j], now, *hyper[j + 1 :])
+        now = best
+
+
+def _near(hyper: JointHyper, lowest: int) -> list[JointHyper]:
+    """Neighbours on the grid, with no level below the lowest."""
+    bounds = [*([(0, len(settings.DISCREPANCY_SIZES))] * (len(hyper) - 1)), (lowest, len(LEVELS))]
+    out = []
+    for axis, (bottom, top) in enumerate(bounds):
+        for step in (-1, 1):
+            if bottom <= hyper[axis] + step < top:
+                out.append((*hyper[:axis], hyper[axis] + step, *hyper[axis + 1 :]))
+    return out

@@ -1,0 +1,65 @@
+"""What a candidate would add to a set, with sizes and levels as they are."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import linalg
+
+from irb140_jax.mismatch.regression.gaussian import root, with_prior
+from irb140_jax.mismatch.selection.evidence import Hyper, Space
+
+
+def near(space: Space, chosen: Sequence[int], hyper: Hyper, columns: np.ndarray) -> np.ndarray:
+    """Gram matrix of some shared columns and y, inertials, nuisances and a set integrated out."""
+    base, extra, prior = space.set_columns(chosen), space.with_y(columns), space.prior(chosen, hyper)
+    chol = root(with_prior(space.gram(hyper, base, base) * np.outer(prior, prior)))
+    across = prior[:, None] * space.gram(hyper, base, extra)
+    half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
+    return space.gram(hyper, extra, extra) - half.T @ half
+
+
+def gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) -> np.ndarray:
+    """Log posterior odds of adding each of some candidates to a set; -inf if inadmissible."""
+    out = np.full(len(which), -np.inf)
+    if not len(which):
+        return out
+    extra = np.unique(np.concatenate([space.columns[i] for i in which]))
+    number = np.full(space.size, -1)
+    number[extra] = np.arange(len(extra))
+    base, prior = space.set_columns(chosen), space.prior(chosen, hyper)
+    more = space.kinds.one_more(chosen)
+    chol = root(with_prior(space.gram(hyper, base, base) * np.outer(prior, prior)))
+    across = prior[:, None] * space.gram(hyper, base, space.with_y(extra))
+    half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
+    with_y = space.gram(hyper, extra, np.array([space.size]))[:, 0] - half[:, :-1].T @ half[:, -1]
+    by_size: dict[int, list[int]] = {}
+    for m, i in enumerate(which):
+        by_size.setdefault(len(space.columns[i]), []).append(m)
+    for k, members in by_size.items():
+        columns = np.array([space.columns[which[m]] for m in members])
+        at = number[columns]
+        part = half[:, at]
+        each = np.moveaxis(part, 0, 1)
+        M = np.eye(k) - np.swapaxes(each, 1, 2) @ each
+        for g, of_joint, place in zip(space.joints, hyper, space.places, strict=True):
+            mine = place[columns]
+            moved = np.flatnonzero((mine >= 0).any(axis=1))
+            if len(moved):
+                M[moved] += g.at(of_joint).blocks(mine[moved])
+        rhs = with_y[at]
+        mean = np.linalg.solve(M, rhs[..., None])[..., 0]
+        gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
+        ids = which[members]
+        out[members] = np.where(space.outside(ids, mean), -np.inf, gain + space.log_prior[ids] + more[ids])
+    return out
+
+
+def reshaped(space: Space, chosen: Sequence[int], hyper: Hyper) -> tuple[int, ...]:
+    """The set with the best other shape for each member whose amplitudes can't be at its own, if there is one."""
+    now = list(chosen)
+    for c in space.inadmissible(chosen, hyper):
+        rest = tuple(i for i in now if i != c)
+        gained = gains(space, rest, hyper, np.array(space.alike[c]))
+        if np.isfinite(gained).any():
+            now = [*rest, space.alike[c][int(np.argmax(gained))]]
+    return tuple(sorted(now))
