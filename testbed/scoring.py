@@ -58,10 +58,11 @@ def stated_classes(line: dict[str, Any]) -> list[dict[str, Any]]:
     """How each special thing with a name came out.
 
     Returns:
-        kind; how: "named", "in the class", "not testable", "unexplained" or "missed"; size: names in the class.
+        kind; how: "named", "in the class", "not testable", "unexplained" or "missed"; size: names in the class;
+        visible: standard deviations above the noise, None where that was not measured.
     """
-    said, out = line["diagnosis"], []
-    for h in line["truth"]["hidden"]:
+    said, out, hidden = line["diagnosis"], [], line["truth"]["hidden"]
+    for h, visible in zip(hidden, line.get("visible", [None] * len(hidden)), strict=True):
         if h["role"] != "special" or not h["accept"] or set(h["joints"]) <= set(line["truth"]["dead"]):
             continue
         how, size = "missed", 0
@@ -78,7 +79,7 @@ def stated_classes(line: dict[str, Any]) -> list[dict[str, Any]]:
             how = "not testable"
         if how == "missed" and any(set(u["joints"]) & set(h["joints"]) for u in said["unexplained"]):
             how = "unexplained"
-        out.append({"kind": h["kind"], "slug": h["slug"], "how": how, "size": size})
+        out.append({"kind": h["kind"], "slug": h["slug"], "how": how, "size": size, "visible": visible})
     return out
 
 
