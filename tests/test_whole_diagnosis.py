@@ -1,6 +1,7 @@
 """The whole way of a diagnosis, on plants that share nothing with it."""
 
 import json
+import re
 
 from testbed import runner, scoring
 from testbed.cases import make
@@ -25,3 +26,10 @@ def test_torque_constants_all_wrong_alike_are_one_torque_scale_and_no_rotors():
 def test_nothing_is_named_where_only_inertials_are_wrong():
     line = said(2)
     assert not line["diagnosis"]["findings"] and line["diagnosis"]["verdict"] == "parameters_only"
+
+
+def test_a_rise_of_friction_at_low_speed_that_is_not_named_is_said_with_its_place():
+    line = said(86)  # Hess and Soom's law on j2, which the discrepancy's block of speed can hold whole
+    named = any(f["effect"] == "stribeck_friction" and f["joints"] == ["j2"] for f in line["diagnosis"]["findings"])
+    on_j2 = re.compile(r"j2 \([^)]*higher when it is slow[^)]*\).* the corrected model adds")
+    assert named or any(on_j2.search(note) for note in line["diagnosis"]["notes"])

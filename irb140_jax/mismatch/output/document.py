@@ -158,6 +158,6 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     return [
         *of.data.servo_notes, *harmful_notes(robot, of.harmful), *open_joints,
         *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names),
-        *clocks, *discrepancy_notes(robot, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
+        *clocks, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
         *notes(of.data, of.uncertainty, judged), *gap_notes(robot, gap, torque, lacking),
     ]  # fmt: skip

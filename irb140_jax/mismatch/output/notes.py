@@ -14,6 +14,8 @@ from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.robot import Robot
 
 FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
+# What each block of the discrepancy depends on, in the order of `SCALED`.
+GOES_WITH = ("its position", "its speed", "its position, speed and load together", "what it does around reversals")
 DELAY, DELAYS = FIXED.index("delay"), (settings.DELAY_COMMON, settings.DELAY_JOINT)
 
 
@@ -134,16 +136,38 @@ def timing_notes(ex: Explanation) -> list[str]:
     return [f"Torque is logged early or late beside the positions: {', '.join(off)}. The fit allows for it."]
 
 
-def discrepancy_notes(robot: Robot, proof: HeldOut) -> list[str]:
-    """A note where the corrected model holds torque that no effect explains."""
-    joints = [name for name, carried in zip(robot.joint_names, proof.carried, strict=True) if carried]
-    if not joints:
+def discrepancy_notes(ex: Explanation, proof: HeldOut) -> list[str]:
+    """A note where the corrected model holds torque that no effect explains: how much, and what it goes with."""
+    said = [_discrepancy_of_joint(ex, int(j)) for j in np.flatnonzero(proof.carried)]
+    if not said:
         return []
     return [
-        f"On {', '.join(joints)} the corrected model adds torque that no effect explains, as a function of the joint's "
+        f"On {', '.join(said)} the corrected model adds torque that no effect explains, as a function of the joint's "
         "own motion, because this lowers the error on unseen motions. `irb140 predict` includes it; corrected.xml and "
         "load_corrected do not."
     ]
+
+
+def _discrepancy_of_joint(ex: Explanation, j: int) -> str:
+    """A joint, and in brackets the size of its discrepancy and the block that makes most of it."""
+    own, group, robot = ex.prediction()[2][j], ex.extra[0].groups[j], ex.lib.robot
+    use = [s.use[:, j] for s in ex.data.stretches]
+    blocks = np.stack([
+        np.concatenate([e.own[j][u][:, group == k] @ own[group == k] for e, u in zip(ex.extra, use, strict=True)])
+        for k in range(len(GOES_WITH))
+    ])  # fmt: skip
+    most = int(np.argmax(np.mean(blocks**2, axis=1)))
+    size, unit = float(np.sqrt(np.mean(blocks.sum(axis=0) ** 2))), "N" if robot.is_slide[j] else "N m"
+    how = ""
+    if SCALED[most] == "speed":
+        qd = np.concatenate([s.qd[u, j] for s, u in zip(ex.data.stretches, use, strict=True)])
+        slow = np.abs(qd) < settings.SLOW * ex.scales.speed[j]
+        drag = np.sign(qd) * blocks[most]
+        if slow.any() and not slow.all():
+            higher = drag[slow].mean() > drag[~slow].mean()
+            how = f": friction is {'higher' if higher else 'lower'} when it is slow"
+            how += ", as Stribeck friction is" if higher else ""
+    return f"{robot.joint_names[j]} ({size:.2g} {unit} RMS, most of it with {GOES_WITH[most]}{how})"
 
 
 def _sentence(note: str) -> str:
