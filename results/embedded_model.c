@@ -31,6 +31,7 @@ static const double FRICTION[N] = {0, 0, 0};
 static const double STIFFNESS[N] = {0, 0, 0};
 static const double REST[N] = {0, 0, 0};
 static const int SLIDE[N] = {0, 0, 0};
+static const int PARENT[N] = {-1, 0, 1};
 static const double GRAVITY[3] = {0, 0, -9.8100000000000005};
 
 static void rotate(const double R[9], const vec x, vec y) {
@@ -47,8 +48,14 @@ static void cross_add(const vec a, const vec b, vec y) {
 
 void inverse_dynamics(const double q[N], const double qd[N], const double qdd[N], double tau[N]) {
     double R[N][9];
-    vec p[N], f[N], m[N], w = {0, 0, 0}, dw = {0, 0, 0}, a = {-GRAVITY[0], -GRAVITY[1], -GRAVITY[2]};
+    vec p[N], f[N], m[N], turn[N], spin_up[N], rise[N];
+    const vec still = {0, 0, 0}, base = {-GRAVITY[0], -GRAVITY[1], -GRAVITY[2]};
     for (int i = 0; i < N; i++) {
+        const int before = PARENT[i];
+        const double *old_w = before < 0 ? still : turn[before], *old_dw = before < 0 ? still : spin_up[before];
+        const double *old_a = before < 0 ? base : rise[before];
+        double *w = turn[i], *dw = spin_up[i], *a = rise[i];
+        for (int k = 0; k < 3; k++) { w[k] = old_w[k]; dw[k] = old_dw[k]; a[k] = old_a[k]; }
         const double *z = AXIS[i], x = q[i] - REFERENCE[i];
         double S[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
         vec slide = {0, 0, 0}, t;
@@ -98,12 +105,13 @@ void inverse_dynamics(const double q[N], const double qd[N], const double qdd[N]
         tau[i] = z[0] * load[0] + z[1] * load[1] + z[2] * load[2];
         tau[i] += ARMATURE[i] * qdd[i] + DAMPING[i] * x + FRICTION[i] * ((x > 0) - (x < 0));
         tau[i] += STIFFNESS[i] * (q[i] - REST[i]);
-        if (i) {
+        if (PARENT[i] >= 0) {
+            double *on = f[PARENT[i]], *about = m[PARENT[i]];
             vec force, moment;
             rotate(R[i], f[i], force);
             rotate(R[i], m[i], moment);
             cross_add(p[i], force, moment);
-            for (int k = 0; k < 3; k++) { f[i-1][k] += force[k]; m[i-1][k] += moment[k]; }
+            for (int k = 0; k < 3; k++) { on[k] += force[k]; about[k] += moment[k]; }
         }
     }
 }
