@@ -133,6 +133,7 @@ class JointGram:
         self._totals = [(k, _sum(blocks, w), float(w @ rows)) for k, w in alike.items()]
         self._once = self._totals[0][1:] if self._totals else (np.zeros(blocks.shape[1:]), 0.0)
         self._log_prior = log_prior_of_sizes()
+        self._by_level: dict[float, tuple[np.ndarray, float]] = {}
         self._kept: dict[tuple[JointHyper, bool], Integrated] = {}
 
     def without(self, blocks: np.ndarray) -> "JointGram":
@@ -151,13 +152,13 @@ class JointGram:
         """
         if all(k == 1 for k, *_ in self._totals):
             return self._once
-        total, rows = 0.0, 0.0
-        for k, gram, count in self._totals:
-            square = level**2
-            sensors = 1.0 - self.misfit
-            worth = square / (sensors / k + square - sensors) / k
-            total, rows = total + worth * gram, rows + worth * count
-        return np.asarray(total), rows
+        if level not in self._by_level:
+            square, sensors = level**2, 1.0 - self.misfit
+            worth = [square / (sensors / k + square - sensors) / k for k, *_ in self._totals]
+            gram = sum(w * G for w, (_, G, _) in zip(worth, self._totals, strict=True))
+            rows = sum(w * count for w, (*_, count) in zip(worth, self._totals, strict=True))
+            self._by_level[level] = np.asarray(gram), rows
+        return self._by_level[level]
 
     def at(self, hyper: JointHyper, instrument: bool = True) -> Integrated:
         """Own nuisances integrated out; kept, for a search asks for the same ones thousands of times.
@@ -178,6 +179,7 @@ class JointGram:
     def forget(self) -> None:
         """Drop what is kept: hundreds of megabytes, once a search is over."""
         self._kept.clear()
+        self._by_level.clear()
 
     def _integrated(self, hyper: JointHyper, instrument: bool) -> Integrated:
         level, size, D = LEVELS[hyper[-1]], own_scale(self.groups, hyper), len(self.groups)
