@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
 
 from irb140_jax.effects import At
 from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
 from irb140_jax.mismatch.regression.nuisances import FIXED, SCALED
 from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.selection.explanation import Explanation
@@ -16,7 +16,7 @@ from irb140_jax.robot import Robot
 FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
 # What each block of the discrepancy depends on, in the order of `SCALED`.
 GOES_WITH = ("its position", "its speed", "its position, speed and load together", "what it does around reversals")
-DELAY, DELAYS = FIXED.index("delay"), (settings.DELAY_COMMON, settings.DELAY_JOINT)
+DELAY = FIXED.index("delay")
 
 
 def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]:
@@ -117,16 +117,17 @@ def timing_notes(ex: Explanation) -> list[str]:
     """
     space, named = ex.space, {j for c in ex.members if c.effect.place.at is At.LOG_TIMING for j in c.joints}
     mean, cov = space.posterior(ex.chosen, ex.hyper)
-    columns, common, width = space.set_columns(ex.chosen), space.inertials + 1, np.hypot(*DELAYS)
+    columns, common = space.set_columns(ex.chosen), space.inertials + 1
+    of_all, of_one = settings.DELAY_COMMON, settings.DELAY_JOINT
     off = []
     for j, of_joint in enumerate(ex.hyper):
         integrated, at = space.joints[j].at(of_joint), space.places[j][columns]
         own = integrated.own()[DELAY]
-        by_shared = np.where(at >= 0, -DELAYS[1] * own[at], 0.0)
-        by_shared[common] += DELAYS[0]
-        early = float(by_shared @ mean + DELAYS[1] * own[-1])
-        unsure = float(np.hypot(np.sqrt(by_shared @ cov @ by_shared), DELAYS[1] * integrated.spread()[DELAY]))
-        odds = stats.norm.logpdf(0.0, 0.0, width) - stats.norm.logpdf(0.0, early, unsure) + np.log(settings.RARE)
+        by_shared = np.where(at >= 0, -of_one * own[at], 0.0)
+        by_shared[common] += of_all
+        early = float(by_shared @ mean + of_one * own[-1])
+        unsure = float(np.hypot(np.sqrt(by_shared @ cov @ by_shared), of_one * integrated.spread()[DELAY]))
+        odds = log_odds_of_any(early, unsure, float(np.hypot(of_all, of_one))) + np.log(settings.RARE)
         if j not in named and odds > 0.0 and abs(early) > settings.NOTABLE_DELAY:
             way = "early" if early > 0.0 else "late"
             # To one digit: of a shift in time, the fit knows the slope of the torque alone.

@@ -4,10 +4,10 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
 
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
+from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
 from irb140_jax.mismatch.regression.nuisances import FIXED
 from irb140_jax.mismatch.regression.servo import NAMES
 from irb140_jax.mismatch.result import Finding
@@ -117,7 +117,7 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     out = []
     for j in range(ex.lib.robot.n):
         own, spread = (x[COMMAND_DELAY] for x in _joint_nuisances(ex, j))
-        odds = stats.norm.logpdf(0.0) - stats.norm.logpdf(0.0, own, spread) + np.log(settings.RARE)
+        odds = log_odds_of_any(float(own), float(spread), 1.0) + np.log(settings.RARE)
         if odds > 0.0 and abs(servo.delay_width * own) > settings.NOTABLE_DELAY:
             late, width = 1e3 * servo.delay_width * own, 1e3 * servo.delay_width * spread
             way = "late" if own > 0 else "early"

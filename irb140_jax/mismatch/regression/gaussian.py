@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, stats
 
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.noise import Noise
@@ -165,3 +165,8 @@ def gain_of(H: np.ndarray, columns: np.ndarray) -> float:
     L = root(with_prior(H[np.ix_(columns, columns)]))
     v = linalg.solve_triangular(L, H[columns, -1], lower=True)
     return 0.5 * float(v @ v) - float(np.log(np.diag(L)).sum())
+
+
+def log_odds_of_any(mean: float, std: float, prior: float) -> float:
+    """Log odds that a parameter is not zero, from its posterior and the width of its prior (Savage and Dickey)."""
+    return float(stats.norm.logpdf(0.0, 0.0, prior) - stats.norm.logpdf(0.0, mean, std))
