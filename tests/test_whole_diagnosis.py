@@ -31,5 +31,5 @@ def test_nothing_is_named_where_only_inertials_are_wrong():
 def test_a_rise_of_friction_at_low_speed_that_is_not_named_is_said_with_its_place():
     line = said(86)  # Hess and Soom's law on j2, which the discrepancy's block of speed can hold whole
     named = any(f["effect"] == "stribeck_friction" and f["joints"] == ["j2"] for f in line["diagnosis"]["findings"])
-    on_j2 = re.compile(r"j2 \([^)]*higher when it is slow[^)]*\).* the corrected model adds")
+    on_j2 = re.compile(r"adds torque that no effect explains.* on j2 [^;]*friction is higher at low speed")
     assert named or any(on_j2.search(note) for note in line["diagnosis"]["notes"])

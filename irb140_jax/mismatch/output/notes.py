@@ -143,14 +143,14 @@ def discrepancy_notes(ex: Explanation, proof: HeldOut) -> list[str]:
     if not said:
         return []
     return [
-        f"On {', '.join(said)} the corrected model adds torque that no effect explains, as a function of the joint's "
-        "own motion, because this lowers the error on unseen motions. `irb140 predict` includes it; corrected.xml and "
+        "The corrected model adds torque that no effect explains, as a function of a joint's own motion, because this "
+        f"lowers the error on unseen motions: on {'; on '.join(said)}. `irb140 predict` includes it; corrected.xml and "
         "load_corrected do not."
     ]
 
 
 def _discrepancy_of_joint(ex: Explanation, j: int) -> str:
-    """A joint, and in brackets the size of its discrepancy and the block that makes most of it."""
+    """A joint, the size of its discrepancy, and the block that makes most of it."""
     own, group, robot = ex.prediction()[2][j], ex.extra[0].groups[j], ex.lib.robot
     use = [s.use[:, j] for s in ex.data.stretches]
     blocks = np.stack([
@@ -166,9 +166,9 @@ def _discrepancy_of_joint(ex: Explanation, j: int) -> str:
         drag = np.sign(qd) * blocks[most]
         if slow.any() and not slow.all():
             higher = drag[slow].mean() > drag[~slow].mean()
-            how = f": friction is {'higher' if higher else 'lower'} when it is slow"
-            how += ", as Stribeck friction is" if higher else ""
-    return f"{robot.joint_names[j]} ({size:.2g} {unit} RMS, most of it with {GOES_WITH[most]}{how})"
+            how = " (friction is higher at low speed, as Stribeck friction is)" if higher else (
+                " (friction is lower at low speed)")  # fmt: skip
+    return f"{robot.joint_names[j]} {size:.2g} {unit} RMS, most of it with {GOES_WITH[most]}{how}"
 
 
 def _sentence(note: str) -> str:
