@@ -8,7 +8,7 @@ from helpers_report import example_document
 
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import Diagnosis, load_diagnosis
-from irb140_jax.mismatch.records import plain, rounded
+from irb140_jax.mismatch.records import digits, plain, rounded
 from irb140_jax.mismatch.result import Estimate
 
 
@@ -62,3 +62,8 @@ def test_a_broken_file_is_refused(content, tmp_path):
 def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
     with pytest.raises(InputError, match="holds no diagnosis.json"):
         load_diagnosis(tmp_path)
+
+
+@pytest.mark.parametrize(("x", "count", "said"), [(431.2, 2, "430"), (12.0, 1, "10"), (0.0571, 2, "0.057"), (5.0, 2, "5")])
+def test_numbers_of_sentences_have_no_exponent(x, count, said):
+    assert digits(x, count) == said

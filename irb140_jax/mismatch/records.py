@@ -9,23 +9,28 @@ from typing import Any, Literal
 import numpy as np
 
 
-def rounded(x: Any, digits: int = 6) -> Any:
-    """Numbers to `digits` significant digits, so that the same input gives the same file; None for what is no number.
+def rounded(x: Any, to: int = 6) -> Any:
+    """Numbers to `to` significant digits, so that the same input gives the same file; None for what is no number.
 
     Args:
         x: A record, or dictionaries, lists and tuples, of numbers and whatever else.
-        digits: How many.
+        to: How many.
     """
     if dataclasses.is_dataclass(x) and not isinstance(x, type):
-        return dataclasses.replace(x, **{f.name: rounded(getattr(x, f.name), digits) for f in dataclasses.fields(x)})
+        return dataclasses.replace(x, **{f.name: rounded(getattr(x, f.name), to) for f in dataclasses.fields(x)})
     if isinstance(x, dict):
-        return {k: rounded(v, digits) for k, v in x.items()}
+        return {k: rounded(v, to) for k, v in x.items()}
     if isinstance(x, list | tuple):
-        return type(x)([rounded(v, digits) for v in x])
+        return type(x)([rounded(v, to) for v in x])
     if isinstance(x, float | np.floating):
         value = float(x)
-        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+        return float(f"{value:.{to}g}") if math.isfinite(value) else None
     return x.item() if isinstance(x, np.generic) else x
+
+
+def digits(x: float, count: int = 2) -> str:
+    """A number to so many significant digits for a sentence: "430", where the format .2g writes 4.3e+02."""
+    return f"{float(f'{x:.{count}g}'):g}"
 
 
 def plain(x: Any) -> Any:

@@ -6,6 +6,7 @@ import numpy as np
 
 from irb140_jax.effects import At
 from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.records import digits
 from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
 from irb140_jax.mismatch.regression.nuisances import FIXED, SCALED
 from irb140_jax.mismatch.regression.sufficient_data import Comparison
@@ -131,7 +132,7 @@ def timing_notes(ex: Explanation) -> list[str]:
         if j not in named and odds > 0.0 and abs(early) > settings.NOTABLE_DELAY:
             way = "early" if early > 0.0 else "late"
             # To one digit: of a shift in time, the fit knows the slope of the torque alone.
-            off.append(f"{ex.lib.robot.joint_names[j]} about {1e3 * abs(early):.1g} ms {way}")
+            off.append(f"{ex.lib.robot.joint_names[j]} about {digits(1e3 * abs(early), 1)} ms {way}")
     if not off:
         return []
     return [f"Torque is logged early or late beside the positions: {', '.join(off)}. The fit allows for it."]
@@ -168,7 +169,7 @@ def _discrepancy_of_joint(ex: Explanation, j: int) -> str:
             higher = drag[slow].mean() > drag[~slow].mean()
             how = " (friction is higher at low speed, as Stribeck friction is)" if higher else (
                 " (friction is lower at low speed)")  # fmt: skip
-    return f"{robot.joint_names[j]} {size:.2g} {unit} RMS, most of it with {GOES_WITH[most]}{how}"
+    return f"{robot.joint_names[j]} {digits(size)} {unit} RMS, most of it with {GOES_WITH[most]}{how}"
 
 
 def _sentence(note: str) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
+from irb140_jax.mismatch.records import digits
 from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
 from irb140_jax.mismatch.regression.nuisances import FIXED
 from irb140_jax.mismatch.regression.servo import NAMES
@@ -122,9 +123,9 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
             late, width = 1e3 * servo.delay_width * own, 1e3 * servo.delay_width * spread
             way = "late" if own > 0 else "early"
             out.append(
-                f"Commands of {ex.lib.robot.joint_names[j]} act {abs(late):.2g} +- {width:.1g} ms {way}; the fit takes "
-                "this into account. It can't tell whether the drive applies its commands late, its torque lags, or the "
-                "clocks are out of step."
+                f"Commands of {ex.lib.robot.joint_names[j]} act {digits(abs(late))} +- {digits(width, 1)} ms {way}; "
+                "the fit takes this into account. It can't tell whether the drive applies its commands late, its "
+                "torque lags, or the clocks are out of step."
             )
     return out
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.records import digits
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
@@ -49,7 +50,7 @@ def undecidable(
         elif left[j] > max(settings.NOT_SMALL * size[j], settings.ABOVE_NOISE * scatter[j]):
             times, share = left[j] / max(scatter[j], 1e-300), 100 * left[j] / max(size[j], 1e-300)
             out[int(j)] = (
-                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {times:.2g} times the noise of the sensors "
-                f"and {share:.0f} % of its torque: check its columns, and record longer motion"
+                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {digits(times)} times the noise of the "
+                f"sensors and {share:.0f} % of its torque: check its columns, and record longer motion"
             )
     return out
