@@ -64,6 +64,8 @@ def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
         load_diagnosis(tmp_path)
 
 
-@pytest.mark.parametrize(("x", "count", "said"), [(431.2, 2, "430"), (12.0, 1, "10"), (0.0571, 2, "0.057"), (5.0, 2, "5")])
+@pytest.mark.parametrize(
+    ("x", "count", "said"), [(431.2, 2, "430"), (12.0, 1, "10"), (0.0571, 2, "0.057"), (5.0, 2, "5")]
+)
 def test_numbers_of_sentences_have_no_exponent(x, count, said):
     assert digits(x, count) == said
