@@ -1,6 +1,7 @@
 """Each setting of a diagnosis multiplied and divided by 1.5: what is said otherwise on cases of *work*.
 
     python experiments/settings_swept.py                    # goes on where it stopped; an hour of two cores
+    python experiments/settings_swept.py --cases 3          # what is stored; half an hour
     python experiments/settings_swept.py --part 0 --of 2    # every second setting; with --part 1 in another process
     python experiments/settings_swept.py --page-only
 
@@ -19,7 +20,7 @@ import tyro
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.mismatch import diagnose, settings
-from testbed.cases import Variation, make
+from testbed.cases import Variation, kinds_of, make
 from testbed.runner import read_case
 
 ROOT = pathlib.Path(__file__).parents[1]
@@ -112,6 +113,8 @@ def page(results: list[dict[str, Any]]) -> str:
         f"on cases 0 to {max(usual, default=0)} of the testbed's draw *work*, {every} names in all. + and - are names",
         "that come and go; a name that goes may still be listed as an alternative. Probabilities and shares near one",
         f"are moved by their odds. Engine at commit {', '.join(sorted({r['engine'] for r in results}))}.", "",
+        f"The cases hide {'; '.join(' and '.join(kinds_of('work', i)) for i in sorted(usual))}: plain things, so that",
+        "nothing is said of names that are close to even.", "",
         "| setting | value | x 1.5 | / 1.5 |", "|---|---|---|---|",
     ]  # fmt: skip
     flips = 0
