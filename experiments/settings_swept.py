@@ -113,8 +113,8 @@ def page(results: list[dict[str, Any]]) -> str:
         f"on cases 0 to {max(usual, default=0)} of the testbed's draw *work*, {every} names in all. + and - are names",
         "that come and go; a name that goes may still be listed as an alternative. Probabilities and shares near one",
         f"are moved by their odds. Engine at commit {', '.join(sorted({r['engine'] for r in results}))}.", "",
-        f"The cases hide {'; '.join(' and '.join(kinds_of('work', i)) for i in sorted(usual))}: plain things, so that",
-        "nothing is said of names that are close to even.", "",
+        f"The cases hide {'; '.join(' and '.join(kinds_of('work', i)) for i in sorted(usual))}; of other",
+        "kinds, and of names that are close to even, this says nothing.", "",
         "| setting | value | x 1.5 | / 1.5 |", "|---|---|---|---|",
     ]  # fmt: skip
     flips = 0

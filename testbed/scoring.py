@@ -12,7 +12,7 @@ from testbed.rubbing import ORDINARY
 EVERYWHERE = ("time_delay", "gravity_tilt", "payload", "contact", "external_wrench")
 GAIN_WITHIN = 0.05
 # What a note has to speak of besides the joint, so that a repaired sample is no statement about a dead channel.
-OF_THE_LOG = re.compile(r"dead|froz|constant|zero|stuck|differ|between recordings|\blate\b|delay|saturat", re.I)
+OF_THE_LOG = re.compile(r"dead|froz|constant|zero|stuck|differs between|\blate\b|delay|saturat", re.I)
 NOT_A_BODY = re.compile(r"(?:mass|Ixx|Iyy|Izz)[^,;]*? (?:->|to|is|of) -\d[\d.e+-]* kg")
 
 

@@ -24,8 +24,8 @@ def test_a_section_holds_the_figures_of_its_cases():
     assert section["cases"] == 2 and section["diagnosed"] == 1 and section["engine"] == "abc"
     assert "| false names a case, ordinary friction aside | 1 | at most 0.05 |" in section["figures"]
     assert "| torque constants named within 5 % | 1 of 1: 100.0 % (21 to 100) |" in section["figures"]
-    assert "| joints where it is at most 1.3 | 1 of 2: 50.0 % (9 to 91) |  |" in section["figures"]
-    assert "| joints where it is at most 1.3 | none | all |" in section["figures"]  # stored before it was measured
+    assert "| joints where it is at most 1.3 | 1 of 2: 50.0 % (9 to 91) | all |" in section["figures"]
+    assert "| joints where it is at most 1.3 | none |  |" in section["figures"]  # stored before it was measured
     assert section["coverage"].endswith("| torque_gain | 1 | 0 | 0 | 100 |")  # two standard deviations off
     assert "payload on a, b | 0.7 |" in section["false"] and section["others"] == ["4 (torque_gain): KeyError: x"]
 

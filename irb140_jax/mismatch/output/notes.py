@@ -127,7 +127,7 @@ def timing_notes(ex: Explanation) -> list[str]:
         by_shared = np.where(at >= 0, -of_one * own[at], 0.0)
         by_shared[common] += of_all
         early = float(by_shared @ mean + of_one * own[-1])
-        unsure = float(np.hypot(np.sqrt(by_shared @ cov @ by_shared), of_one * integrated.spread()[DELAY]))
+        unsure = float(np.hypot(np.sqrt(max(by_shared @ cov @ by_shared, 0.0)), of_one * integrated.spread()[DELAY]))
         odds = log_odds_of_any(early, unsure, float(np.hypot(of_all, of_one))) + np.log(settings.RARE)
         if j not in named and odds > 0.0 and abs(early) > settings.NOTABLE_DELAY:
             way = "early" if early > 0.0 else "late"
@@ -140,9 +140,10 @@ def timing_notes(ex: Explanation) -> list[str]:
 
 def discrepancy_notes(ex: Explanation, proof: HeldOut) -> list[str]:
     """A note where the corrected model holds torque that no effect explains: how much, and what it goes with."""
-    said = [_discrepancy_of_joint(ex, int(j)) for j in np.flatnonzero(proof.carried)]
-    if not said:
+    if not proof.carried.any():
         return []
+    own = ex.prediction()[2]
+    said = [_discrepancy_of_joint(ex, int(j), own[j]) for j in np.flatnonzero(proof.carried)]
     return [
         "The corrected model adds torque that no effect explains, as a function of a joint's own motion, because this "
         f"lowers the error on unseen motions: on {'; on '.join(said)}. `irb140 predict` includes it; corrected.xml and "
@@ -150,9 +151,9 @@ def discrepancy_notes(ex: Explanation, proof: HeldOut) -> list[str]:
     ]
 
 
-def _discrepancy_of_joint(ex: Explanation, j: int) -> str:
-    """A joint, the size of its discrepancy, and the block that makes most of it."""
-    own, group, robot = ex.prediction()[2][j], ex.extra[0].groups[j], ex.lib.robot
+def _discrepancy_of_joint(ex: Explanation, j: int, own: np.ndarray) -> str:
+    """A joint, the size of its discrepancy, and the block that makes most of it; from its own columns' coefficients."""
+    group, robot = ex.extra[0].groups[j], ex.lib.robot
     use = [s.use[:, j] for s in ex.data.stretches]
     blocks = np.stack([
         np.concatenate([e.own[j][u][:, group == k] @ own[group == k] for e, u in zip(ex.extra, use, strict=True)])
