@@ -28,7 +28,7 @@ from table4_report import CONDITIONS, MODELS, cell, ours, weakest
 
 REPEATABILITY = 0.03  # [mm] of the IRB 140's pose, by its specification
 # Results of the study, as there are others in the folder.
-STORED = ("tables_1_2", "table3_swarms", "table3_sets", "table4_control", "torque_swarms", "tracking_swarms", "mlp_kinematics",
+STORED = ("tables_1_2", "table3_swarms", "table3_sets", "table4_control", "torque_swarms", "tracking_swarms", "tracking_circle", "mlp_kinematics",
           "time_per_iteration", "noisy_swarms", "embedded_model")  # fmt: skip
 # What the text says of Table 4, by the first words of our quantity, of its two conditions.
 SAID_OF_TABLE_4 = {
@@ -70,6 +70,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
     perhaps = lambda name: load(name) if (folder / f"{name}.json").is_file() else None  # noqa: E731
     arm, t3, sets, t4 = (load(n) for n in ("tables_1_2", "table3_swarms", "table3_sets", "table4_control"))
     torque, tracking = load("torque_swarms"), perhaps("tracking_swarms")
+    circle = perhaps("tracking_circle")
     network, time, noisy, embedded = map(perhaps, ("mlp_kinematics", "time_per_iteration", "noisy_swarms", "embedded_model"))
     told = readings_in(folder)
     sections = {
@@ -95,21 +96,14 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         share=f"{100 * t4['config']['share']:.0f}", mujoco=max(t4["mujoco"].values()), table5=table5(t3, t4, of.is_studys),
         torque_table=torque_swarms.table(torque), tracking_table=tracking_report.table(tracking) if tracking else "",
         tracking_seen=tracking_report.said_of_seen(tracking) if tracking else "",
-        tracking_tests=tracking_report.said_of_tests(tracking) if tracking else "", **of_circle(tracking), of_control=of_control(t4), against_gain=against_gain(t4),
+        tracking_tests=tracking_report.said_of_tests(tracking) if tracking else "", circle=circle,
+        circle_table=tracking_report.table(circle) if circle else "", circle_seen=tracking_report.said_of_seen(circle) if circle else "",
+        circle_tests=tracking_report.said_of_tests(circle) if circle else "", of_control=of_control(t4), against_gain=against_gain(t4),
         network_table=network_table(network) if network else "", network_on=mlp_report.judged_on(network["cases"]) if network else "",
         network_seeds=mlp_report.by_seed(network["cases"]) if network else "",
         near_singular=mlp_report.near_singular(network["cases"], network["tests"]) if network else "",
         others=other_arms(folder) if of.is_studys else [], choice=choice(t3["made"]["options"]),
     )  # fmt: skip
-
-
-def of_circle(tracking: dict | None) -> dict:
-    """What the searches along the circle are shown by, and the time that all would take: 4 objectives in place of 1."""
-    if not tracking or not tracking["circle"]:
-        return {"circle_table": "", "circle_seen": "", "circle_hours": 0.0}
-    told = tracking["circle"]
-    hours = 4.0 * told["seconds"] / 3600.0 * tracking["seeds"] / told["seeds"]
-    return {"circle_table": tracking_report.table(told), "circle_seen": tracking_report.said_of_seen(told), "circle_hours": hours}
 
 
 def choice(options: dict) -> str:

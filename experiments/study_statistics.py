@@ -25,6 +25,7 @@ FAMILIES = {
     "network": "what each penalty changes near singular poses",
     "future": "the swarms that the study leaves to the future, with torque noise",
     "tracking": "QPSO against PSO when the closed loop is the objective",
+    "tracking_circle": "the same along the study's circle",
 }
 
 

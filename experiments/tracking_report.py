@@ -15,10 +15,8 @@ matplotlib.rcParams["svg.hashsalt"] = "irb140"
 
 def page(result: dict) -> str:
     """What each objective identifies, and what none can."""
-    parts = [table(result), said_of_seen(result)]
-    if result["circle"]:
-        parts += ["Along the circle:", table(result["circle"]), said_of_seen(result["circle"])]
-    parts = [f"# Swarms judged by the closed loop: {result['arm']}", *parts, said_of_tests(result)]
+    parts = [f"# Swarms judged by the closed loop, {result['motion']}: {result['arm']}", table(result)]
+    parts += [said_of_seen(result), said_of_tests(result)]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 

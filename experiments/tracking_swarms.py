@@ -1,12 +1,13 @@
 """The study's future research: swarms judged by the tracking, torque smoothness or energy of a controlled motion.
 
-    python experiments/tracking_swarms.py [--robot arm.xml] [--joints n] [--smoke]
+    python experiments/tracking_swarms.py [--robot arm.xml] [--joints n] [--smoke]   # 14 minutes of one core
+    python experiments/tracking_swarms.py --circle                                   # 2.7 hours of one core
 
 A candidate is what the controller believes of the arm; the arm itself is the true one.  Each candidate drives the arm
-along a lively motion for some seconds; those of the study's own arm also along the circle of 30 s, with as many seeds
-as the whole leaves time for in 25 minutes of one core.  Two questions: what do these objectives identify, and which
-parameters can no closed loop see?  Every search is stored when it is done.  Writes tracking_runs.parquet (one row a
-run), tracking_swarms.json and .md, and figure_tracking.svg.
+along a lively motion for some seconds, or along the study's own motion, the circle in 30 s.  Two questions: what do
+these objectives identify, and which parameters can no closed loop see?  Every search is stored when it is done, and an
+interrupted run goes on after the last.  Writes tracking_runs.parquet (one row a run), tracking_swarms.json and .md, and
+figure_tracking.svg; with --circle tracking_circle_runs.parquet, tracking_circle.json and .md.
 """
 # pandas types every column as all that it might be.
 # pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportIndexIssue=false
@@ -52,9 +53,6 @@ RULES = {
 ENCODER = np.radians(0.01)  # [rad] resolution of the IRB 140's joints by its specification
 VISIBLE_CHANGE = 0.1  # share by which parameters change when visibility is asked: between PSO's error and the box
 ROUND_OFF = 1e-9  # share of the largest singular value below which a direction is not there at all
-FILE = "tracking_runs.parquet"
-FOURIER, CIRCLE = "Fourier motion", "circle"
-FEWEST = 10  # runs of a search of which a test can say anything after Holm's correction
 MEASURES = ("tracking", "smoothness", "energy")
 
 
@@ -63,25 +61,35 @@ class Config(StudyConfig):
     """What to run.
 
     Attributes:
+        circle: Judge along the circle; it is that of the study's own arm.
         seeds: Runs of each search.
-        duration: Of the motion that a candidate is judged by [s].
+        duration: Of the lively motion [s].
         dt: Half of a step of Runge-Kutta's [s].  Its error must stay below what the parameters do: Euler's own at 4 ms,
             half a milliradian, is not zero at the truth, so that tracking would lead away from it.
         width: Half of the box's width, as a fraction of the truth.
         speed: Of the motion, as a share of the joints' largest speeds.
-        circle_seeds: Runs of each search for tracking along the circle; the study's own arm only.
         circle_duration: Of the circle [s].
         circle_dt: Half of a step there [s]; the motion is so calm that the error is a ten-thousandth of a candidate's.
     """
 
+    circle: bool = False
     seeds: int = SEEDS
     duration: float = 1.6
     dt: float = 0.002
     width: float = 0.5
     speed: float = 0.6
-    circle_seeds: int = 4
     circle_duration: float = 30.0
     circle_dt: float = 0.004
+
+    @property
+    def name(self) -> str:
+        """What the files of results begin with."""
+        return "tracking_circle" if self.circle else "tracking"
+
+    @property
+    def motion(self) -> str:
+        """What the arm is driven along."""
+        return "circle" if self.circle else "Fourier motion"
 
     @property
     def size(self) -> dict[str, Any]:
@@ -229,39 +237,28 @@ def judged(name: str, algorithm: str, x: np.ndarray, loops: tuple[Loop, Loop]) -
 
 
 def run(config: Config, study: StudyArm) -> tuple[pd.DataFrame, dict]:
-    """All searches, one row a run, and what is told of each motion."""
-    first = loop_of(config, study, seed=1)
-    other = first if config.smoke else loop_of(config, study, seed=2)
+    """All searches, those stored taken from there, one row a run; and what is told of the motion.
+
+    The middle of the box stands beside what was found.
+    """
+    judging = circle_loop_of(config, study) if config.circle else loop_of(config, study, seed=1)
+    loops = judging, judging if config.smoke else loop_of(config, study, seed=2)
     tried = [("tracking", "PSO")] if config.smoke else list(itertools.product(OBJECTIVES, RULES))
-    parts = {FOURIER: (config, (first, other), tried)}
-    if study.is_studys and not config.smoke and config.circle_seeds:
-        own = dataclasses.replace(config, seeds=config.circle_seeds)
-        parts[CIRCLE] = own, (circle_loop_of(config, study), other), [("tracking", algorithm) for algorithm in RULES]
-    frames, told = [], {}
-    for motion, (own, loops, searches) in parts.items():
-        frame, told[motion] = _run(motion, own, loops, searches)
-        frames.append(frame.assign(motion=motion))
-    return pd.concat(frames, ignore_index=True), told
-
-
-def _run(motion: str, config: Config, loops: tuple[Loop, Loop], searches: list) -> tuple[pd.DataFrame, dict]:
-    """The searches along one motion, those stored taken from there; the truth and the box's middle beside them."""
-    study = loops[0].study
     alike = lambda x: jnp.tile(jnp.asarray(x), (config.seeds, 1))  # noqa: E731  in the shape that is compiled anyway
     truth, unseen = (
         {key: float(value[0]) for key, value in loop.measures_of(alike(study.x)).items()} for loop in loops
     )
-    folder = config.folder(study) / "tracking_runs"
+    folder = config.folder(study) / f"{config.name}_runs"
     folder.mkdir(exist_ok=True)
     mark = _mark(config, loops[0])
     frames, seconds, commits = [], [], set()
-    for name, algorithm in searches:
-        path = folder / f"{motion}_{name}_{algorithm}.npz".replace(" ", "_")
+    for name, algorithm in tried:
+        path = folder / f"{config.motion}_{name}_{algorithm}.npz".replace(" ", "_")
         found = _stored(path, mark, lambda n=name, a=algorithm: search(config, loops[0], n, a, truth))
         frames.append(judged(name, algorithm, found["x"], loops))
         seconds.append(float(found["seconds"]))
         commits.add(str(found["commit"]))
-        print(f"  done: {motion}, {name}, {algorithm}", flush=True)
+        print(f"  done: {config.motion}, {name}, {algorithm}", flush=True)
     middle = np.asarray(alike(study.unknowns.full(0.5 * sum(box_of(config, study)))))
     frames.append(judged("middle of the box", "", middle, loops).iloc[:1])
     told = {"truth": truth, "truth_unseen": unseen, "seeds": config.seeds, "seconds": sum(seconds)}
@@ -273,7 +270,7 @@ def rows_of(frame: pd.DataFrame) -> list[dict]:
     """One row a search: means of its runs, deviations of the errors."""
     rows = []
     for (objective, algorithm), runs in frame.groupby(["objective", "algorithm"], sort=False):
-        mean = runs.drop(columns=["objective", "algorithm", "seed", "motion"]).mean()
+        mean = runs.drop(columns=["objective", "algorithm", "seed"]).mean()
         row = {"objective": objective, "algorithm": algorithm, "runs": len(runs)}
         row |= {key: float(mean[key]) for key in ("com", "inertia", "torque_rmse")}
         row |= {f"{key}_sd": float(runs[key].std()) if len(runs) > 1 else 0.0 for key in ("com", "inertia")}
@@ -282,14 +279,13 @@ def rows_of(frame: pd.DataFrame) -> list[dict]:
     return rows
 
 
-def tests_of(frame: pd.DataFrame) -> list[Test]:
-    """QPSO against PSO at each objective with enough runs, by what the sets are worth: their errors, unseen torque."""
-    searches = frame.loc[frame["algorithm"] == "QPSO"].groupby(["motion", "objective"], sort=False).size()
-    of = lambda motion, objective, by: (("motion", motion), ("objective", objective), ("algorithm", by))  # noqa: E731
+def tests_of(config: Config, frame: pd.DataFrame, file: str) -> list[Test]:
+    """QPSO against PSO at each objective, by what the sets are worth: their errors, unseen torque."""
+    of = lambda objective, by: (("objective", objective), ("algorithm", by))  # noqa: E731
     return [
-        Test("tracking", f"{motion}, {name}: {key}, QPSO lower than PSO", FILE, key, of(motion, name, "QPSO"),
-             of(motion, name, "PSO"))
-        for motion, name in searches[searches >= FEWEST].index
+        Test(config.name, f"{config.motion}, {name}: {key}, QPSO lower than PSO", file, key, of(name, "QPSO"),
+             of(name, "PSO"))
+        for name in frame.loc[frame["algorithm"] == "QPSO", "objective"].unique()
         for key in ("com", "inertia", "torque_rmse")
     ]  # fmt: skip
 
@@ -321,14 +317,16 @@ def main(config: Config) -> None:
     study = config.arm()
     folder = config.folder(study)
     frame, told = run(config, study)
-    store(frame, folder / FILE)
-    motions = {motion: part | {"rows": rows_of(frame[frame["motion"] == motion])} for motion, part in told.items()}
-    own = made(config.said()) | {"commits": sorted({commit for part in told.values() for commit in part["commits"]})}
-    result = {"made": own, "config": config.said(), "arm": study.name, **motions.pop(FOURIER)}
-    result |= {"circle": motions.get(CIRCLE), "tests": tested(tests_of(frame), folder)}
-    (folder / "tracking_swarms.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    (folder / "tracking_swarms.md").write_text(page(result), encoding="utf-8")
-    figure(result, config.figure_folder(study) / "figure_tracking.svg")
+    file = f"{config.name}_runs.parquet"
+    store(frame, folder / file)
+    own = made(config.said()) | {"commits": told["commits"]}
+    result = {"made": own, "config": config.said(), "arm": study.name, **told, "rows": rows_of(frame)}
+    result |= {"motion": config.motion, "tests": tested(tests_of(config, frame, file), folder)}
+    stem = config.name if config.circle else "tracking_swarms"
+    (folder / f"{stem}.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    (folder / f"{stem}.md").write_text(page(result), encoding="utf-8")
+    if not config.circle:
+        figure(result, config.figure_folder(study) / "figure_tracking.svg")
     print(page(result))
 
 

@@ -102,6 +102,28 @@ def test_screening_says_what_the_evidence_says_at_the_width_of_the_inertials_of_
     np.testing.assert_allclose(gains(space, (2,), hyper, which), expected, atol=1e-8)
 
 
+def test_functions_of_shared_and_own_columns_have_the_moments_of_a_dense_regression():
+    space, data = planted(5, {0: 0.4, 5: 0.3})
+    hyper, chosen, rng = (SETTING, (0, 2, 5, ONE)), (0, 5), np.random.default_rng(6)
+    columns = space.set_columns(chosen)
+    A, y = np.zeros((2 * ROWS, len(columns) + 2 * OWN)), np.concatenate([d["y"] for d in data])
+    sizes = [own_scale(GROUPS, h) for h in hyper]
+    for j, (d, h) in enumerate(zip(data, hyper, strict=True)):
+        wide = np.zeros((ROWS, space.size))
+        wide[:, d["mine"]] = d["X"]
+        rows, own = slice(j * ROWS, (j + 1) * ROWS), len(columns) + OWN * j + np.arange(OWN)
+        A[rows, : len(columns)], A[rows, own] = wide[:, columns] / LEVELS[h[-1]], d["E"] / LEVELS[h[-1]]
+        y[rows] /= LEVELS[h[-1]]
+    # Amplitudes are planted so small that no prior is widened to their size.
+    prior = np.concatenate([space.prior(chosen, hyper), *sizes])
+    cov = prior[:, None] * np.linalg.inv((A * prior).T @ (A * prior) + np.eye(len(prior))) * prior
+    shared, own = rng.normal(size=(3, len(columns))), rng.normal(size=(3, OWN))
+    both = np.concatenate([shared, np.zeros((3, OWN)), own], axis=1)
+    mean, spread = space.functions(chosen, hyper, 1, shared, own)
+    np.testing.assert_allclose(mean, both @ cov @ A.T @ y, atol=1e-9)
+    np.testing.assert_allclose(spread, both @ cov @ both.T, atol=1e-9)
+
+
 def test_the_prior_of_the_widths_is_a_probability():
     assert np.exp(LOG_PRIOR).sum() == pytest.approx(1.0)
 

@@ -47,6 +47,7 @@ class Law:
         variants: Subsets of the columns that make sense by themselves.
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         contains: Slugs of laws that are special cases of this one: they compete.
+        falls: Whether its name is that of any friction that falls as the speed rises, whatever the form of the fall.
         absorbs: Whether the law and a special case side by side are again the law, so that they never stand so.
         to_log: Of a law of the log: from any torques x (T, any), the time between samples [s], w (k,) and shape (s,)
             to what the log shows beside x, (T, any).
@@ -61,6 +62,7 @@ class Law:
     variants: tuple[tuple[int, ...], ...] = ((0,),)
     own: tuple[int, ...] = (-1,)
     contains: tuple[str, ...] = ()
+    falls: bool = False
     absorbs: bool = True
     to_log: Callable[[np.ndarray, float, np.ndarray, np.ndarray], np.ndarray] | None = None
 

@@ -50,6 +50,7 @@ EFFECT = Effect(
         from_physical=_from_physical,
         variants=((0, 1),),
         contains=("coulomb_friction",),
+        falls=True,
     ),
     place=Place(At.FRICTION),
     prior=Prior(lowest=("frictionloss", 0.0), dissipative=True),

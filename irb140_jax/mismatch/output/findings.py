@@ -66,6 +66,8 @@ def torque_scale_finding(robot: Robot, ex: Explanation) -> list[Finding]:
 
 def _log_odds(ex: Explanation, index: int) -> float:
     """Log posterior odds of a finding against the set without it; of friction also against ordinary friction."""
+    if index in ex.falls:
+        return ex.falls[index].log_odds
     c, rest = ex.data.candidates[index], ex.others(index)
     options = [rest]
     if c.effect.place.is_friction and not c.effect.prior.ordinary:

@@ -117,17 +117,14 @@ def timing_notes(ex: Explanation) -> list[str]:
     any rare effect.
     """
     space, named = ex.space, {j for c in ex.members if c.effect.place.at is At.LOG_TIMING for j in c.joints}
-    mean, cov = space.posterior(ex.chosen, ex.hyper)
-    columns, common = space.set_columns(ex.chosen), space.inertials + 1
     of_all, of_one = settings.DELAY_COMMON, settings.DELAY_JOINT
+    shared = np.zeros((1, len(space.set_columns(ex.chosen))))
+    shared[0, space.inertials + 1] = of_all
     off = []
-    for j, of_joint in enumerate(ex.hyper):
-        integrated, at = space.joints[j].at(of_joint), space.places[j][columns]
-        own = integrated.own()[DELAY]
-        by_shared = np.where(at >= 0, -of_one * own[at], 0.0)
-        by_shared[common] += of_all
-        early = float(by_shared @ mean + of_one * own[-1])
-        unsure = float(np.hypot(np.sqrt(max(by_shared @ cov @ by_shared, 0.0)), of_one * integrated.spread()[DELAY]))
+    for j, gram in enumerate(space.joints):
+        own = of_one * (np.arange(len(gram.groups)) == DELAY)[None]
+        mean, cov = space.functions(ex.chosen, ex.hyper, j, shared, own)
+        early, unsure = float(mean[0]), float(np.sqrt(cov[0, 0]))
         odds = log_odds_of_any(early, unsure, float(np.hypot(of_all, of_one))) + np.log(settings.RARE)
         if j not in named and odds > 0.0 and abs(early) > settings.NOTABLE_DELAY:
             way = "early" if early > 0.0 else "late"
@@ -161,16 +158,7 @@ def _discrepancy_of_joint(ex: Explanation, j: int, own: np.ndarray) -> str:
     ])  # fmt: skip
     most = int(np.argmax(np.mean(blocks**2, axis=1)))
     size, unit = float(np.sqrt(np.mean(blocks.sum(axis=0) ** 2))), "N" if robot.is_slide[j] else "N m"
-    how = ""
-    if SCALED[most] == "speed":
-        qd = np.concatenate([s.qd[u, j] for s, u in zip(ex.data.stretches, use, strict=True)])
-        slow = np.abs(qd) < settings.SLOW * ex.scales.speed[j]
-        drag = np.sign(qd) * blocks[most]
-        if slow.any() and not slow.all():
-            higher = drag[slow].mean() > drag[~slow].mean()
-            how = " (friction is higher at low speed, as Stribeck friction is)" if higher else (
-                " (friction is lower at low speed)")  # fmt: skip
-    return f"{robot.joint_names[j]} {digits(size)} {unit} RMS, most of it with {GOES_WITH[most]}{how}"
+    return f"{robot.joint_names[j]} {digits(size)} {unit} RMS, most of it with {GOES_WITH[most]}"
 
 
 def _sentence(note: str) -> str:

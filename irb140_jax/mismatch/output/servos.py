@@ -86,7 +86,7 @@ def of_servos(ex: Explanation, servo: Commanded | None, found: list[Finding]) ->
         said = ""
         if f.effect == "viscous_friction":
             j = names.index(f.joints[0])
-            off = float(servo.drive.kd_width[j] * _joint_nuisances(ex, j)[0][DRIVE_KD])
+            off = float(servo.drive.kd_width[j]) * _own_nuisance(ex, j, DRIVE_KD)[0]
             both = (f.parameters["viscous"].value or 0.0) + float(servo.drive.kd[j]) + off
             said = (
                 f" It can't be told from the drive's Kd, which is taken as {servo.drive.kd[j]:.3g}: only the sum of "
@@ -117,8 +117,8 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     """
     out = []
     for j in range(ex.lib.robot.n):
-        own, spread = (x[COMMAND_DELAY] for x in _joint_nuisances(ex, j))
-        odds = log_odds_of_any(float(own), float(spread), 1.0) + np.log(settings.RARE)
+        own, spread = _own_nuisance(ex, j, COMMAND_DELAY)
+        odds = log_odds_of_any(own, spread, 1.0) + np.log(settings.RARE)
         if odds > 0.0 and abs(servo.delay_width * own) > settings.NOTABLE_DELAY:
             late, width = 1e3 * servo.delay_width * own, 1e3 * servo.delay_width * spread
             way = "late" if own > 0 else "early"
@@ -130,12 +130,12 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     return out
 
 
-def _joint_nuisances(ex: Explanation, j: int) -> tuple[np.ndarray, np.ndarray]:
-    """A joint's nuisance parameters and their standard deviations, both in prior standard deviations."""
-    mean, _ = ex.space.posterior(ex.chosen, ex.hyper)
-    columns, of_joint = ex.space.set_columns(ex.chosen), ex.hyper[j]
-    own = ex.space.own(j, of_joint, columns, mean, instrument=True)
-    return own, ex.space.joints[j].at(of_joint).spread()
+def _own_nuisance(ex: Explanation, j: int, which: int) -> tuple[float, float]:
+    """One of a joint's own nuisance parameters and its standard deviation, both in prior standard deviations."""
+    shared = np.zeros((1, len(ex.space.set_columns(ex.chosen))))
+    own = (np.arange(len(ex.space.joints[j].groups)) == which)[None].astype(float)
+    mean, cov = ex.space.functions(ex.chosen, ex.hyper, j, shared, own)
+    return float(mean[0]), float(np.sqrt(cov[0, 0]))
 
 
 def servo_sentence(recordings: Sequence[Recording]) -> str:

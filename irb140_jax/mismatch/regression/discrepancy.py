@@ -81,12 +81,22 @@ def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> list[n
     position = np.polynomial.chebyshev.chebvander(x, ORDERS)[:, 1:]
     fast = 1.0 + 2.0 * np.log(np.abs(r.qd[:, j]) / scales.speed[j] + 1e-3) / np.log(1e3)
     speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
-    qd, direction = r.qd[:, [j]], r.direction[:, [j]]
-    slow = np.array(settings.ROUNDED_SPEEDS) * scales.speed[j]
-    rounded, tails = direction - qd / np.hypot(qd, slow), direction - qd / (np.abs(qd) + slow)
+    rounded, tails = by_speed(r.qd[:, j], r.direction[:, j], float(scales.speed[j]))
     carried = load[:, j] / max(float(scales.torque[j]), 1e-12)
     smooth, reversal = _smooth(r, carried, j, position, speed), _reversal(r, load, carried, scales, j, rounded)
     return [position[:, 1:], np.concatenate([rounded, tails], axis=1), smooth, reversal]
+
+
+def by_speed(qd: np.ndarray, direction: np.ndarray, top: float) -> tuple[np.ndarray, np.ndarray]:
+    """Friction that goes over into its level as the speed rises: quickly and slowly, at several speeds, (T, 4) each.
+
+    Args:
+        qd: Velocity, shape (T,) [rad/s or m/s].
+        direction: Of the motion, shape (T,).
+        top: The joint's top speed [rad/s or m/s].
+    """
+    slow, v, level = np.array(settings.ROUNDED_SPEEDS) * top, qd[:, None], direction[:, None]
+    return level - v / np.hypot(v, slow), level - v / (np.abs(v) + slow)
 
 
 def _smooth(r: Conditioned, carried: np.ndarray, j: int, position: np.ndarray, speed: np.ndarray) -> np.ndarray:

@@ -95,16 +95,15 @@ class Integrated:
         out[self.used] = self.scale[:, None] * linalg.solve_triangular(self.chol, half.T, lower=True, trans=1)
         return out
 
-    def spread(self) -> np.ndarray:
-        """Standard deviation of the own columns' coefficients beside shared ones that are known, shape (D,)."""
-        out = np.zeros(self.first)
-        inverse = linalg.solve_triangular(self.chol, np.eye(len(self.used)), lower=True)
-        out[self.used] = self.scale * np.sqrt(np.sum(inverse**2, axis=0))
-        return out
+    def cov(self, own: np.ndarray) -> np.ndarray:
+        """Covariance of linear functions (m, D) of the own columns' coefficients, shared ones known, shape (m, m)."""
+        half = linalg.solve_triangular(self.chol, (own[:, self.used] * self.scale).T, lower=True)
+        return half.T @ half
 
     def dof(self) -> float:
         """How many of the own columns the rows determine."""
-        return float(len(self.used) - np.sum((self.spread()[self.used] / self.scale) ** 2))
+        inverse = linalg.solve_triangular(self.chol, np.eye(len(self.used)), lower=True)
+        return float(len(self.used) - np.sum(inverse**2))
 
 
 class JointGram:

@@ -229,6 +229,25 @@ class Space:
         own, at = self.joints[joint].at(of_joint, instrument).own(), self.places[joint][columns]
         return own[:, -1] - own[:, at[at >= 0]] @ mean[at >= 0]
 
+    def functions(
+        self, chosen: Sequence[int], hyper: Hyper, joint: int, shared: np.ndarray, own: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean (m,) and covariance (m, m) of linear functions of a set's columns and a joint's own nuisances.
+
+        Args:
+            chosen: The set.
+            hyper: Sizes and levels.
+            joint: Which.
+            shared: Weights of the columns of `set_columns`, shape (m, k).
+            own: Weights of the own nuisances, shape (m, D).
+        """
+        mean, cov = self.posterior(chosen, hyper)
+        integrated, at = self.joints[joint].at(hyper[joint]), self.places[joint][self.set_columns(chosen)]
+        per, there = integrated.own(), at >= 0
+        along = shared.astype(float)
+        along[:, there] -= own @ per[:, at[there]]
+        return along @ mean + own @ per[:, -1], along @ cov @ along.T + integrated.cov(own)
+
     @cached_property
     def summed(self) -> dict[tuple, float]:
         """What sums over shapes gain, as far as they are known: see `hyperparameters.over_shapes`."""

@@ -28,6 +28,7 @@ from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
 from irb140_jax.mismatch.selection.averages import site_of
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted, parts
+from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.recordings.condition import Conditioned
@@ -140,12 +141,13 @@ def _explained(given: _Given, start: _Start, *, last: bool = False) -> Explanati
         # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
         return _explained(given, dataclasses.replace(start, at=None), last=last)
     best, hyper = named(space, best, hyper, sets) if last else (best, hyper)
+    best, hyper, falls = with_falling_friction(space, data, extra[0], given.scales, best, hyper)
     for joint in joints:
         joint.forget()
     members = [data.candidates[i] for i in best]
     held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
     data = dataclasses.replace(data, stretches=held)
-    ex = Explanation(lib, given.scales, data, extra, noise, space, space, best, hyper, sets, given.factor)
+    ex = Explanation(lib, given.scales, data, extra, noise, space, space, best, hyper, sets, given.factor, falls)
     return _by_block(ex, given.sensors) if last else ex
 
 

@@ -1,9 +1,10 @@
 """A set of candidates beside the rigid body: what it is in the data, and how probable it and its members are."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy import special
 
 from irb140_jax.effects import Scales
 from irb140_jax.mismatch import settings
@@ -16,6 +17,7 @@ from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
+from irb140_jax.mismatch.selection.falling_friction import Fall
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.screening import gains, near, reshaped
 
@@ -36,6 +38,7 @@ class Explanation:
         hyper: Sizes of the discrepancy and noise levels of each joint beside them.
         sets: Log posterior of every set that the search visited.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
+        falls: Members that are named because friction certainly falls with speed, whatever its form.
         scaled: Whether one scale of all logged torques is a finding.
     """
 
@@ -50,6 +53,7 @@ class Explanation:
     hyper: Hyper
     sets: Sets
     factor: np.ndarray
+    falls: Mapping[int, Fall] = dataclasses.field(default_factory=dict)
     scaled: bool = False
 
     @property
@@ -75,9 +79,11 @@ class Explanation:
     def log_posterior(self, chosen: Sequence[int], joints: Sequence[int] | None = None) -> float:
         """Log posterior of a set, sizes and levels fitted to it anew, at some joints or all.
 
-        Without a member, others may have another shape.
+        Without a member, others may have another shape.  In place of a law that is named for its falling curve stands
+        ordinary friction, as in the search.
         """
-        value, members = -np.inf, tuple(sorted(chosen))
+        members = tuple(sorted(self.falls[c].usual if c in self.falls else c for c in chosen))
+        value = -np.inf
         for other in dict.fromkeys((members, reshaped(self.space, members, self.hyper))):
             known = self.sets.get(frozenset(other))
             value = max(value, settled(self.space, other, self.hyper, joints)[0] if known is None else known)
@@ -168,12 +174,17 @@ class Explanation:
 
     def probability(self, index: int) -> float:
         """Of a chosen candidate's effect at its joints, over all sets visited."""
+        if index in self.falls:
+            return float(special.expit(self.falls[index].log_odds))
         c = self.data.candidates[index]
         return probabilities(self.data.candidates, self.sets).get((c.slug, c.joints), 0.0)
 
     def rivals(self, index: int) -> dict[Site, float]:
-        """Share of the sets in which another effect stands in a chosen candidate's place, by that effect."""
-        return in_its_place(self.data.candidates, self.sets, self.chosen, index)[0]
+        """Share of the sets in which another effect stands in a chosen candidate's place, by that effect.
+
+        Of friction that certainly falls with speed none: with a special case of it, the discrepancy holds the fall.
+        """
+        return {} if index in self.falls else in_its_place(self.data.candidates, self.sets, self.chosen, index)[0]
 
 
 def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:
