@@ -63,7 +63,6 @@ class Case:
         hidden: Kinds that were drawn.
         plant: What was recorded, along motions.
         motions: Those.
-        without: For each entry of the truth's `hidden` that is special, the plant without it, else None.
     """
 
     draw: str
@@ -76,7 +75,6 @@ class Case:
     hidden: tuple[str, ...]
     plant: Plant
     motions: tuple[Motion, ...]
-    without: tuple[Plant | None, ...]
 
 
 def kinds_of(draw: str, index: int, commit: str = "") -> tuple[str, ...]:
@@ -124,35 +122,25 @@ def make(draw: str, index: int, commit: str = "", vary: Variation = Variation())
     motions = programme(nominal, moving, name, moving.uniform(*SECONDS) * vary.longer)
     plant, sizes = Plant(nominal, built(nominal, rng, error)), sizes_of(nominal, motions)
     strength: dict[str, float] = {}
-    moments: list[tuple[Plant, Plant]] = []
     for kind in kinds:
         if kind in KINDS:
-            strength[kind] = put_in(kind, plant, sizes, rng, moments)
+            strength[kind] = put_in(kind, plant, sizes, rng)
     if kinds != ("nothing",) and (kinds[0] == "ordinary" or rng.random() < 0.9):
         rubbing.rubbed(plant, sizes, rng)
     logger = random_logger(logging, nominal.slide, sizes.tau)
     logger = dataclasses.replace(logger, noise=vary.noise * logger.noise, steps=vary.noise * logger.steps)
     setting = {"inertial_error": error, "stated_error": STATED, "programme": name, "strength": strength}
-    case = assembled(draw, index, kinds, plant, sizes, motions, unseen, logger, logging, setting)
-    without = [plant.less(*moment) for moment in moments]
-    return dataclasses.replace(case, without=(*without, *case.without[len(without) :]))
+    return assembled(draw, index, kinds, plant, sizes, motions, unseen, logger, logging, setting)
 
 
-def put_in(
-    kind: str, plant: Plant, sizes: Sizes, rng: np.random.Generator, moments: list[tuple[Plant, Plant]]
-) -> float:
-    """Hide a kind, at one free joint or at every one, and say how strong it is, in shares of the joint's torque.
-
-    `moments` grows by the plant before and after each thing that is hidden.
-    """
+def put_in(kind: str, plant: Plant, sizes: Sizes, rng: np.random.Generator) -> float:
+    """Hide a kind, at one free joint or at every one, and say how strong it is, in shares of the joint's torque."""
     strength = 10.0 ** rng.uniform(-1.5, -0.6)
     used = {h.joints[0] for h in plant.hidden if len(h.joints) == 1}
     free = [j for j in range(plant.arm.n) if j not in used]  # two laws on one joint would share parameters
     joints = free if kind in EVERY_JOINT and rng.random() < 0.6 else free and [int(rng.choice(free))]
     for j in joints:
-        before = plant.now()
         KINDS[kind](plant, sizes, rng, j, strength * float(sizes.tau[j]))
-        moments += [(before, plant.now())] * (len(plant.hidden) - len(before.hidden))
     return strength
 
 
@@ -174,7 +162,7 @@ def assembled(
             r["tau"][:, j] = np.round(r["tau_true"][:, j], 6)  # a dead channel has no noise either
     truth = truth_of(plant, sizes, logger) | setting
     return Case(draw, index, plant.nominal.xml, plant.nominal.names, recordings, held_out, truth, kinds, plant,
-                tuple(motions), (None,) * len(plant.hidden))  # fmt: skip
+                tuple(motions))  # fmt: skip
 
 
 def truth_of(plant: Plant, sizes: Sizes, logger: Logger) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
-from scipy import interpolate, signal
+from scipy import interpolate
 
 from testbed import drives, flexible, rigid
 from testbed.arms import Arm
@@ -71,19 +71,6 @@ class Plant:
         n = self.arm.n
         self.zero, self.late = (x if len(x) else np.zeros(n) for x in (self.zero, self.late))
 
-    def now(self) -> "Plant":
-        """The plant as it is now: what is hidden in it later does not change this one."""
-        lists = {name: list(getattr(self, name)) for name in ("laws", "drives", "hidden")}
-        return dataclasses.replace(self, **lists, dead=dict(self.dead))
-
-    def less(self, before: "Plant", after: "Plant") -> "Plant":
-        """The plant without what was hidden between two earlier moments, and of the arm nothing that came later."""
-        kept = {name: [x for x in getattr(self, name) if x in getattr(before, name) or x not in getattr(after, name)]
-                for name in ("laws", "drives")}  # fmt: skip
-        undone = {name: getattr(before, name) for name in ("arm", "transmission", "zero", "late")
-                  if getattr(before, name) is not getattr(after, name)}  # fmt: skip
-        return dataclasses.replace(self, **kept, **undone, dead=before.dead)
-
 
 @dataclasses.dataclass(frozen=True)
 class Sizes:
@@ -138,21 +125,6 @@ def channels(plant: Plant, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     for j, shown in plant.dead.items():
         tau[:, j] = shown(motion.t, tau[:, j])
     return motion.q + plant.zero, tau
-
-
-def hidden_torque(plant: Plant, without: Plant, motion: Motion, cut: float) -> np.ndarray:
-    """Torque by which the channels of two plants differ where their logged positions agree, below `cut` [Hz].
-
-    Less what dry and viscous friction of each joint can do of it; two samples a period of `cut`, shape (t, n).
-    """
-    tau, bare = (channels(p, dataclasses.replace(motion, q=motion.q - p.zero))[1] for p in (plant, without))
-    low_pass, every = signal.cheby2(8, 60.0, cut, fs=1.0 / STEP, output="sos"), max(round(0.5 / (cut * STEP)), 1)
-    low = lambda x: signal.sosfiltfilt(low_pass, x, axis=0)[::every]  # noqa: E731
-    out = low(tau - bare)
-    for j, qd in enumerate(motion.qd.T):
-        rubbing = low(np.stack([np.sign(qd), qd], axis=1))
-        out[:, j] -= rubbing @ np.linalg.lstsq(rubbing, out[:, j], rcond=None)[0]
-    return out
 
 
 def torque_along(

@@ -26,7 +26,7 @@ import tyro
 from scipy import signal
 
 from testbed.cases import Case, Variation, make
-from testbed.plants import hidden_torque, torque_along
+from testbed.plants import torque_along
 
 RESULTS = pathlib.Path(__file__).parents[1] / "results"
 KEPT = ("verdict", "findings", "unexplained", "not_testable", "fit", "notes", "summary")
@@ -70,7 +70,6 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
         unseen: Error of nominal, refit and corrected on motions that nobody fitted, RMS a joint [N m or N].
         band: Frequency below which it was compared [Hz]; noise_in_band: what of the torque sensors' noise lies there;
             left_in_band: what the true plant leaves there along the positions as they are known.
-        visible: How far each hidden thing stands above the torque sensors' noise; None for ordinary friction.
         impossible: Links whose exported inertials no body has, by model.
     """
     # Here, so that cases can be made where the package is not installed.
@@ -89,7 +88,6 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
         out["sentences"] = [x["sentence"] for x in result.views.to_json()["inertials"] if x["sentence"]]
         out |= _compared(case, result, [mismatch.predict(result.model, r) for r in unseen])
         out["left_in_band"] = left_by_the_truth(case, robot, recordings, out["band"])
-        out["visible"] = visible(case, out["band"], out["noise_in_band"])
     except InputError as error:
         out["refused"] = re.sub(r"\S*/(?=\w+\.\w+)", "", str(error))  # file names, without this machine's folders
     except Exception as error:  # a crash is a result, too
@@ -144,18 +142,6 @@ def left_by_the_truth(case: Case, robot: Any, recordings: list[Any], band: float
         left += np.sum(np.where(use, low_passed(r.tau - true, r.t, band), 0.0) ** 2, axis=0)
         rows += use.sum(axis=0)
     return dict(zip(case.joint_names, np.sqrt(left / np.maximum(rows, 1)).tolist(), strict=True))
-
-
-def visible(case: Case, band: float, noise: dict[str, float]) -> list[float | None]:
-    """How many standard deviations each hidden thing stands above the torque sensors' noise, all samples together.
-
-    For who knows everything else but the level of ordinary friction: nobody sees more.
-    """
-    level, out = np.array([noise[name] for name in case.joint_names]), []
-    for plant in case.without:
-        parts = [] if plant is None else [hidden_torque(case.plant, plant, m, band) / level for m in case.motions]
-        out.append(float(np.sqrt(sum(np.sum(x**2) for x in parts))) if parts else None)
-    return out
 
 
 def _inner(t: np.ndarray) -> np.ndarray:

@@ -58,11 +58,10 @@ def stated_classes(line: dict[str, Any]) -> list[dict[str, Any]]:
     """How each special thing with a name came out.
 
     Returns:
-        kind; how: "named", "in the class", "not testable", "unexplained" or "missed"; size: names in the class;
-        visible: standard deviations above the noise, None where that was not measured.
+        kind; how: "named", "in the class", "not testable", "unexplained" or "missed"; size: names in the class.
     """
-    said, out, hidden = line["diagnosis"], [], line["truth"]["hidden"]
-    for h, visible in zip(hidden, line.get("visible", [None] * len(hidden)), strict=True):
+    said, out = line["diagnosis"], []
+    for h in line["truth"]["hidden"]:
         if h["role"] != "special" or not h["accept"] or set(h["joints"]) <= set(line["truth"]["dead"]):
             continue
         how, size = "missed", 0
@@ -79,7 +78,7 @@ def stated_classes(line: dict[str, Any]) -> list[dict[str, Any]]:
             how = "not testable"
         if how == "missed" and any(set(u["joints"]) & set(h["joints"]) for u in said["unexplained"]):
             how = "unexplained"
-        out.append({"kind": h["kind"], "slug": h["slug"], "how": how, "size": size, "visible": visible})
+        out.append({"kind": h["kind"], "slug": h["slug"], "how": how, "size": size})
     return out
 
 

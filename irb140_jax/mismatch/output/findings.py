@@ -65,7 +65,10 @@ def torque_scale_finding(robot: Robot, ex: Explanation) -> list[Finding]:
 
 
 def _log_odds(ex: Explanation, index: int) -> float:
-    """Log posterior odds of a finding against the set without it; of friction also against ordinary friction."""
+    """Log posterior odds of a finding against the set without it; of friction also against ordinary friction.
+
+    Where others are inadmissible without it, against the best set without it that the search visited.
+    """
     if index in ex.falls:
         return ex.falls[index].log_odds
     c, rest = ex.data.candidates[index], ex.others(index)
@@ -75,7 +78,11 @@ def _log_odds(ex: Explanation, index: int) -> float:
         usual = [i for i, o in enumerate(ex.data.candidates) if o.effect.prior.ordinary and o.joints == c.joints]
         options.append((*rest, *(i for i in usual if (ex.data.candidates[i].slug, c.joints) not in taken)))
     joints = list(c.joints)
-    return ex.log_posterior(ex.chosen, joints) - max(ex.log_posterior(o, joints) for o in options)
+    without = max(ex.log_posterior(o, joints) for o in options)
+    if not np.isfinite(without):
+        here = {i for i, o in enumerate(ex.data.candidates) if (o.slug, o.joints) == (c.slug, c.joints)}
+        without = max((value for other, value in ex.sets.items() if not other & here), default=-np.inf)
+    return ex.log_posterior(ex.chosen, joints) - without
 
 
 def _alternatives(ex: Explanation, index: int) -> tuple[Alternative, ...]:
