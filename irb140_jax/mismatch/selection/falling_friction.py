@@ -93,7 +93,8 @@ def with_falling_friction(
     for j in range(len(space.joints)):
         dry = [i for i in best if space.candidates[i].slug == DRY and space.candidates[i].joints == (j,)]
         laws = [i for i, c in enumerate(space.candidates) if c.effect.law.falls and c.joints == (j,)]
-        if not dry or not laws:
+        moves = any(s.use[:, j].any() for s in data.stretches)
+        if not (dry and laws and moves):
             continue
         odds = _curve(space, data, extra, scales, best, hyper, j).log_odds_of_fall()
         if odds < np.log(settings.NAMED / (1.0 - settings.NAMED)):
