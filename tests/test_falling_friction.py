@@ -50,6 +50,12 @@ def test_what_all_speeds_share_does_not_hide_a_fall():
     assert unknown_level.log_odds_of_fall() == pytest.approx(curve(FALLING).log_odds_of_fall(), rel=1e-3)
 
 
+def test_a_joint_without_viscous_friction_or_discrepancy_has_no_fall():
+    n = len(SPEED)
+    rounding = np.linspace(1.0, 1.0 - 1e-15, n)
+    assert Curve(SPEED, rounding, np.ones((n, n)) + 1e-20 * np.eye(n), np.ones((n, n))).log_odds_of_fall() == -np.inf
+
+
 def test_friction_known_at_one_speed_alone_is_no_curve():
     same = np.full(16, 0.3)
     assert Curve(same, np.ones(16), 1e-4 * np.eye(16), np.eye(16)).log_odds_of_fall() == -np.inf

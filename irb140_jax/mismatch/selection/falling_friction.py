@@ -70,7 +70,7 @@ class Curve:
         """Log odds that a combination of frictions is positive and not zero."""
         mean, *widths = (float(weights @ self.mean), *(float(weights @ c @ weights) for c in (self.cov, self.prior)))
         std, prior = np.sqrt(np.maximum(widths, 0.0))
-        return log_odds_of_any(mean, std, prior) if mean > 0.0 and std > 0.0 else -np.inf
+        return log_odds_of_any(mean, std, prior) if mean > 0.0 and std > 0.0 and prior > 0.0 else -np.inf
 
 
 def with_falling_friction(
