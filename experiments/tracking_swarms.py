@@ -61,7 +61,7 @@ class Config(StudyConfig):
     """What to run.
 
     Attributes:
-        circle: Judge along the circle; it is that of the study's own arm.
+        circle: Judge along the circle of Table 4 in place of the lively motion.
         seeds: Runs of each search.
         duration: Of the lively motion [s].
         dt: Half of a step of Runge-Kutta's [s].  Its error must stay below what the parameters do: Euler's own at 4 ms,
