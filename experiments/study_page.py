@@ -22,8 +22,9 @@ import torque_swarms
 import tracking_report
 import tyro
 from study_arm import DOCS, StudyArm, StudyConfig
-from study_claims import VERDICTS, arm_claims, beyond_claims, control_claims, network_claims, swarm_claims
+from study_claims import VERDICTS, arm_claims, beyond_claims, control_claims, network_claims
 from study_statistics import ALPHA, FAMILIES, runs, said
+from study_swarm_claims import swarm_claims
 from table4_report import CONDITIONS, MODELS, cell, ours, weakest
 
 REPEATABILITY = 0.03  # [mm] of the IRB 140's pose, by its specification
@@ -77,7 +78,7 @@ def page(folder: pathlib.Path, figures: str, of: StudyArm, choices: list[study_c
         "Identification by swarms": swarm_claims(t3, told, sets, time, of.is_studys),
         "Control with the identified models": control_claims(t4),
         "The arm and its reference values": arm_claims(arm) + (network_claims(network) if network else []),
-        "What the study leaves to the future": beyond_claims(torque, tracking, noisy, embedded),
+        "What the study leaves to the future": beyond_claims(torque, tracking, circle, noisy, embedded),
     }
     sections = {title: claims for title, claims in sections.items() if claims}
     count = Counter(c.verdict for claims in sections.values() for c in claims)
