@@ -9,7 +9,8 @@
 A step whose result is there for the same choices is left out; an interrupted step goes on after the last part it
 stored, that of --again, too, if one goes on without --again.  The network is trained by a process beside the others,
 as neither it nor they keep two cores busy; what measures time waits until it has the machine to itself.  The page,
-docs/study.md for the study's arm, is written anew each time.
+docs/study.md for the study's arm, is written anew each time.  One thing on it is run by itself, because it takes hours:
+searches along the study's circle, `tracking_swarms.py --circle`.
 """
 
 import contextlib
