@@ -3,6 +3,9 @@
 import os
 import pathlib
 
+# Linux lets a process map 65 530 pieces of memory, and every compiled program takes some: past that LLVM crashes.
+MOST_MAPS = 20_000
+
 
 def set_up_compilation_cache() -> pathlib.Path | None:
     """Let JAX keep what it compiles in the user's cache folder, so that the second run of a command starts warm.
@@ -25,3 +28,15 @@ def set_up_compilation_cache() -> pathlib.Path | None:
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     return folder
+
+
+def make_room_for_programs() -> None:
+    """Drop compiled programs where they take so much of what a process may map that LLVM would crash some time.
+
+    They are read again from the compilation cache where there is one.
+    """
+    maps = pathlib.Path("/proc/self/maps")
+    if maps.exists() and maps.read_bytes().count(b"\n") > MOST_MAPS:
+        import jax
+
+        jax.clear_caches()

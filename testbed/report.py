@@ -105,6 +105,24 @@ def coverage(lines: Lines) -> Rows:
     return [(e, str(len(xs)), *(share(xs, level) for level in LEVELS)) for e, xs in sorted(by.items())]
 
 
+def looks_table(looks: list[Lines]) -> str:
+    """Every look at *check* in a row: the engine, and what came out."""
+    rows = []
+    for number, every in enumerate(looks, 1):
+        lines = [x for x in every if x["diagnosis"]]
+        found = [i for x in lines for i in scoring.intervals(x)]
+        classes = [c["size"] > 0 for x in lines for c in scoring.stated_classes(x) if c["slug"]]
+        rows.append((
+            str(number), engines(every), str(len(every)),
+            f"{np.mean([len(scoring.false_names(x)) for x in lines]):.3f}",
+            f"{100 * np.mean([covered(v, s, true, 0.9) for *_, v, s, true in found]):.1f} %",
+            f"{100 * np.mean(classes):.1f} %", _median([f for x in lines for f in scoring.floors(x)]),
+        ))  # fmt: skip
+    head = ("look at *check*", "engine at commit", "cases run", "false names a case", "90 % intervals that hold",
+            "true effect in the stated class", "stated noise over the torque sensors', median")  # fmt: skip
+    return markdown(head, rows)
+
+
 def conditions_table(conditions: dict[str, Lines]) -> str:
     """The same cases under several conditions: what must not get worse with more data or better sensors."""
     shared = set.intersection(*({x["index"] for x in lines if x["diagnosis"]} for lines in conditions.values()))
@@ -227,7 +245,7 @@ def main() -> None:
         (pathlib.Path(__file__).parent / "calibration.md.j2").read_text(encoding="utf-8")
     ).render(
         mixture=", ".join(f"{n} {name}" if n > 1 else name for name, n in many.items()),
-        looks=[{"engine": engines(look), "cases": len(look)} for look in looks],
+        looks=looks_table(looks),
         draws=[section(name, every, runner.read(runner.stored(name, "first"))) for name, every in draws.items()],
         conditions=conditions_table(conditions),
         probes=markdown(head, [probe_row(x) for x in probes]) if probes else "", probes_engine=engines(probes),

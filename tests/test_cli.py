@@ -13,6 +13,7 @@ import types
 import warnings
 
 import helpers_report
+import jax
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,7 +21,7 @@ from helpers_cli import MODEL, recording, refused, stub, table  # noqa: F401
 
 import irb140_jax.mismatch
 import irb140_jax.recordings
-from irb140_jax import cli
+from irb140_jax import cli, compilation_cache
 from irb140_jax.cli.commands import word
 from irb140_jax.cli.diagnose import STEPS
 from irb140_jax.cli.parsing import parsed
@@ -336,3 +337,13 @@ def test_the_version_is_told(capsys):
     with pytest.raises(SystemExit) as stop:
         cli.main(["--version"])
     assert stop.value.code == 0 and re.fullmatch(r"irb140 \d+\.\d+\.\d+\n", capsys.readouterr().out)
+
+
+def test_compiled_programs_are_dropped_before_they_fill_what_a_process_may_map(monkeypatch):
+    program = jax.jit(lambda x: 2.0 * x)
+    program(1.0)
+    compilation_cache.make_room_for_programs()
+    assert program._cache_size() == 1
+    monkeypatch.setattr(compilation_cache, "MOST_MAPS", 0)
+    compilation_cache.make_room_for_programs()
+    assert program._cache_size() == 0 and program(1.0) == 2.0

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from irb140_jax.compilation_cache import make_room_for_programs
 from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
@@ -87,6 +88,7 @@ def diagnose(
     Raises:
         RecordingError: A recording is too short for any filter, or holds what is no number.
     """
+    make_room_for_programs()  # hundreds of robots in one process would crash it
     # Thousands of small solves: a second BLAS thread costs more in waking up than it does.
     with threadpool_limits(1, "blas"):
         return _diagnosed(robot, recordings, config or DiagnoseConfig(), progress)
