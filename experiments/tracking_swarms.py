@@ -1,7 +1,7 @@
 """The study's future research: swarms judged by the tracking, torque smoothness or energy of a controlled motion.
 
     python experiments/tracking_swarms.py [--robot arm.xml] [--joints n] [--smoke]   # 14 minutes of one core
-    python experiments/tracking_swarms.py --circle                                   # 2.7 hours of one core
+    python experiments/tracking_swarms.py --circle                                   # two hours of one core
 
 A candidate is what the controller believes of the arm; the arm itself is the true one.  Each candidate drives the arm
 along a lively motion for some seconds, or along the study's own motion, the circle in 30 s.  Two questions: what do
