@@ -17,8 +17,6 @@ from testbed.statistics import calibration_error, covered, wilson
 
 ROOT = pathlib.Path(__file__).parents[1]
 LOOKS = ("first", "second", "third", "", "fifth", "sixth")  # labels of the looks at *check*
-# Labels of cases of *check* under other conditions than those that were drawn.
-CONDITIONS = {"sixth": "as drawn", "sixth_quiet": "a tenth of the noise", "sixth_long": "motions ten times as long"}
 LEVELS = (0.5, 0.9, 0.99)
 WAYS = ("named", "in the class", "not testable", "unexplained", "missed")
 PLACES = ("located", "named alike", "noted", "not said")
@@ -123,24 +121,6 @@ def looks_table(looks: list[Lines]) -> str:
     return markdown(head, rows)
 
 
-def conditions_table(conditions: dict[str, Lines]) -> str:
-    """The same cases under several conditions: what must not get worse with more data or better sensors."""
-    shared = set.intersection(*({x["index"] for x in lines if x["diagnosis"]} for lines in conditions.values()))
-    rows = []
-    for said, lines in conditions.items():
-        same = [x for x in lines if x["index"] in shared]
-        found = [i for x in same for i in scoring.intervals(x)]
-        rows.append((
-            said, str(len(same)), counted([covered(v, s, true, 0.9) for *_, v, s, true in found]),
-            str(sum(len(scoring.false_names(x)) for x in same)),
-            counted([c["size"] > 0 for x in same for c in scoring.stated_classes(x) if c["slug"]]),
-            _median([f for x in same for f in scoring.floors(x)]),
-        ))  # fmt: skip
-    head = ("condition", "cases", "90 % intervals that hold", "false names", "true effect in the stated class",
-            "stated noise over the torque sensors', median")  # fmt: skip
-    return markdown(head, rows) if shared else ""
-
-
 def tally(lines: Lines, of: Callable[[dict[str, Any]], list[tuple[str, str]]], ways: tuple[str, ...]) -> Rows:
     """How often each kind came out in which way."""
     by = collections.defaultdict(collections.Counter)
@@ -236,7 +216,6 @@ def main() -> None:
     draws = {name: every for name, every in draws.items() if any(x["diagnosis"] for x in every)}
     for name, every in draws.items():
         diagram.draw([x for x in every if x["diagnosis"]], ROOT / "docs" / "figures" / f"calibration_{name}.svg")
-    conditions = {said: runner.read(runner.stored("check", label)) for label, said in CONDITIONS.items()}
     probes = [x for x in runner.read(runner.RESULTS / "testbed_probes.jsonl") if x["diagnosis"]]
     many = collections.Counter(cases.PASS)
     head = ("probe", "false names", "noise over the sensors', largest", "90 % intervals that hold",
@@ -247,7 +226,6 @@ def main() -> None:
         mixture=", ".join(f"{n} {name}" if n > 1 else name for name, n in many.items()),
         looks=looks_table(looks),
         draws=[section(name, every, runner.read(runner.stored(name, "first"))) for name, every in draws.items()],
-        conditions=conditions_table(conditions),
         probes=markdown(head, [probe_row(x) for x in probes]) if probes else "", probes_engine=engines(probes),
         narrower=narrower(probes),
     )  # fmt: skip

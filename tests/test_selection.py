@@ -1,6 +1,7 @@
 """The evidence of sets with model discrepancy, against the density of the data itself; the search on planted sets."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy import integrate, signal, stats
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
+from irb140_jax.mismatch.output.findings import _log_odds
 from irb140_jax.mismatch.regression.gram import LEVELS, ONE, JointGram, log_prior_of_sizes, own_scale
 from irb140_jax.mismatch.regression.noise import correlation_time
 from irb140_jax.mismatch.selection.averages import probabilities
@@ -122,6 +124,18 @@ def test_functions_of_shared_and_own_columns_have_the_moments_of_a_dense_regress
     mean, spread = space.functions(chosen, hyper, 1, shared, own)
     np.testing.assert_allclose(mean, both @ cov @ A.T @ y, atol=1e-9)
     np.testing.assert_allclose(spread, both @ cov @ both.T, atol=1e-9)
+
+
+def test_odds_of_a_finding_without_which_others_are_inadmissible_are_those_against_the_best_set_visited():
+    space, _ = planted(1, {})
+    sets = {frozenset({0, 1}): -3.0, frozenset({1}): -np.inf, frozenset({2}): -9.0, frozenset(): -12.0}
+    data = SimpleNamespace(candidates=space.candidates)
+    ex = SimpleNamespace(
+        falls={}, data=data, chosen=(0, 1), sets=sets, members=[space.candidates[i] for i in (0, 1)],
+        others=lambda index: tuple(i for i in (0, 1) if i != index),
+        log_posterior=lambda chosen, joints: sets[frozenset(chosen)],
+    )  # fmt: skip
+    assert _log_odds(ex, 0) == pytest.approx(6.0)  # pyright: ignore[reportArgumentType]
 
 
 def test_the_prior_of_the_widths_is_a_probability():

@@ -22,6 +22,7 @@ from irb140_jax.mismatch.selection.evidence import DRY, Hyper, Space
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.screening import gains
 
+VISCOUS = "viscous_friction"
 SPEEDS = 16  # of the curve, from the slowest to the fastest motion
 SHARE = 0.05  # of the rows that are slower than the slowest of these, and faster than the fastest
 
@@ -33,10 +34,12 @@ class Fall:
     Attributes:
         log_odds: That friction falls.
         usual: The candidate in whose place the law stands.
+        at_rest: Root mean square of what the discrepancy holds beside the law as the speed nears zero [N m or N].
     """
 
     log_odds: float
     usual: int
+    at_rest: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,26 +110,33 @@ def with_falling_friction(
             law = laws[int(np.argmax(gained))]
             best = tuple(sorted((*rest, law)))
             hyper = max((settled(space, best, h, [j]) for h in (hyper, exact)), key=lambda found: found[0])[1]
-            falls[law] = Fall(odds, dry[0])
+            own = _of_speeds(np.zeros(1), extra, scales, j)
+            mean, cov = space.functions(best, hyper, j, np.zeros((1, len(space.set_columns(best)))), own)
+            falls[law] = Fall(odds, dry[0], float(np.sqrt(mean[0] ** 2 + cov[0, 0])))
     return best, hyper, falls
 
 
 def _curve(
     space: Space, data: Data, extra: Nuisances, scales: Scales, chosen: tuple[int, ...], hyper: Hyper, j: int
 ) -> Curve:
-    """Friction of one joint over speed: its named friction without memory or load, and the discrepancy's."""
+    """Friction of one joint over speed: dry and viscous friction, and the discrepancy's."""
     qd = np.abs(np.concatenate([s.qd[s.use[:, j], j] for s in data.stretches]))
     slowest, fastest = np.quantile(qd, [SHARE, 1.0 - SHARE])
-    speed, ones = np.geomspace(float(slowest), float(fastest), SPEEDS), np.ones(SPEEDS)
-    own = np.zeros((SPEEDS, len(extra.groups[j])))
-    block = extra.groups[j] == SCALED.index("speed")
-    own[:, block] = np.concatenate(by_speed(speed, ones, float(scales.speed[j])), axis=1) * extra.units[j][block]
+    speed = np.geomspace(float(slowest), float(fastest), SPEEDS)
+    own, along = _of_speeds(speed, extra, scales, j), {DRY: np.ones(SPEEDS), VISCOUS: speed}
     shared, at = np.zeros((SPEEDS, len(space.set_columns(chosen)))), space.offset
     for c in (space.candidates[i] for i in chosen):
-        if c.effect.prior.ordinary and c.joints == (j,):
-            each = ones if c.slug == DRY else speed
-            shared[:, at] = each * data.scale[data.nuisances + c.columns[0]]
+        if c.slug in along and c.joints == (j,):
+            shared[:, at] = along[c.slug] * data.scale[data.nuisances + c.columns[0]]
         at += len(c.columns)
     mean, cov = space.functions(chosen, hyper, j, shared, own)
     sizes = own_scale(extra.groups[j], hyper[j])
     return Curve(speed, mean, cov, shared @ shared.T + (own * sizes**2) @ own.T)
+
+
+def _of_speeds(speed: np.ndarray, extra: Nuisances, scales: Scales, j: int) -> np.ndarray:
+    """Weights of a joint's own columns in its friction at some speeds (S,) in one direction, shape (S, D)."""
+    own, block = np.zeros((len(speed), len(extra.groups[j]))), extra.groups[j] == SCALED.index("speed")
+    features = np.concatenate(by_speed(speed, np.ones(len(speed)), float(scales.speed[j])), axis=1)
+    own[:, block] = features * extra.units[j][block]
+    return own

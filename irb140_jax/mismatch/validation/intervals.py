@@ -37,6 +37,10 @@ def parameters_of(
     value = _physical(c, w)
     over_shapes = np.maximum(_variance_over_shapes(ex, index, value), _variance_about_shape(ex, index, w))
     w, cov = _of_all_columns(ex, index, w, cov)
+    if index in ex.falls:
+        # What makes it what it is counts as the speed nears zero, where the discrepancy counts, too.
+        own = np.array(c.effect.law.own)
+        cov[own, own] += ex.falls[index].at_rest ** 2
     physical = lambda w: np.asarray(c.effect.law.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
     variance = _variance_of(physical, w, cov, value) + over_shapes
     variance = variance + _variance_over_variants(ex, index, value)
