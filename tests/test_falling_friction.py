@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from irb140_jax.mismatch.selection.falling_friction import Curve
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.selection.falling_friction import Curve, bends
 
 SPEED = np.geomspace(0.01, 1.0, 16)
 RISING = 1.0 + 0.5 * SPEED
@@ -59,3 +60,9 @@ def test_a_joint_without_viscous_friction_or_discrepancy_has_no_fall():
 def test_friction_known_at_one_speed_alone_is_no_curve():
     same = np.full(16, 0.3)
     assert Curve(same, np.ones(16), 1e-4 * np.eye(16), np.eye(16)).log_odds_of_fall() == -np.inf
+
+
+def test_laws_that_bend_over_speed_are_known():
+    assert {slug for slug, effect in CATALOGUE.items() if bends(effect)} == {
+        "nonlinear_viscous_friction", "thermal_friction_drift"
+    }  # fmt: skip

@@ -9,7 +9,7 @@ from irb140_jax.mismatch.columns.along import columns_along, prepared, seen_by, 
 from irb140_jax.mismatch.columns.torques import Named, better_known, composed, library_of
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.regression.rows import Stretch, stretch
-from irb140_jax.mismatch.regression.tangent import point
+from irb140_jax.mismatch.regression.tangent import delayed, logged, point
 from irb140_jax.recordings.condition import choose_band, condition
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import first_joints, irb140
@@ -115,6 +115,19 @@ def test_slopes_rest_on_what_leans_gravity_and_on_laws_of_the_log():
     model = found_model(np.zeros(10 * N), [np.array(w) for _, _, w, _ in FOUND])
     every = {(slug, joints) for slug, joints, *_ in FOUND}
     assert point(ROBOT, np.zeros(10 * N), model.named).rests_on == every - {("coulomb_friction", (0,))}
+
+
+def test_a_little_more_delay_is_what_moves_the_log_by_a_little(explained):
+    model, _, torques, _ = explained
+    dt, x = float(np.mean(np.diff(SMOOTH.t))), torques.loads.scaled
+    late = point(ROBOT, np.zeros(10 * N), [n for n in model.named if n.effect.slug == "channel_skew"])
+    more = delayed(late, x, dt)
+    np.testing.assert_allclose(more[:, :2], np.gradient(x[:, :2], dt, axis=0))
+    delay = FOUND[-1][2][0]
+    np.testing.assert_allclose(x[:, 2] + delay * more[:, 2], logged(late, x, np.arange(N), dt)[:, 2])
+    later = np.interp(SMOOTH.t + delay, SMOOTH.t, x[:, 2])
+    np.testing.assert_allclose(later[9:-9], (x[:, 2] + delay * more[:, 2])[9:-9], atol=1e-2 * float(np.std(x[:, 2])))
+    np.testing.assert_array_equal(delayed(None, x, dt), np.gradient(x, dt, axis=0))
 
 
 def test_inertials_alone_are_refitted_to_the_plain_log(explained):

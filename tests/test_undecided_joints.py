@@ -16,8 +16,8 @@ BAND = Band(20.0, 32.0, 200.0, 4)
 
 def proof(left: float, rows: int = 2000) -> HeldOut:
     """Errors of this size on a joint, on so many rows."""
-    error = [np.full((rows, 1), left)]
-    return HeldOut(error, error, error, error, error, [np.ones((rows, 1), dtype=bool)], np.zeros(1, dtype=bool))
+    error, moves = [np.full((rows, 1), left)], np.ones((rows, 1), dtype=bool)
+    return HeldOut(error, error, error, error, error, [moves], [moves], np.zeros(1, dtype=bool))
 
 
 @pytest.mark.parametrize(
@@ -47,3 +47,13 @@ def test_what_is_as_large_as_the_torque_is_no_verdict():
     diagnosis = diagnose(robot, recordings).diagnosis.to_json()
     assert diagnosis["verdict"] == "undecided" and "may hide anything" in diagnosis["summary"]
     assert "record" in diagnosis["summary"]
+
+
+def test_errors_are_those_of_the_rows_that_are_asked_for():
+    some = proof(1.0, 4)
+    moves = np.array([[True], [True], [False], [False]])
+    recorded = np.array([[True], [True], [True], [False]])
+    error = [np.array([[3.0], [3.0], [6.0], [100.0]])]
+    some = dataclasses.replace(some, use=[moves], recorded=[recorded])
+    np.testing.assert_allclose(some.rmse(error), [3.0])
+    np.testing.assert_allclose(some.rmse(error, at_rest=True), [np.sqrt(18.0)])

@@ -37,9 +37,9 @@ def _to_log(x, dt, w, shape):
 
 
 def _at_shape(shape):
-    # The slope is taken over the delay itself, give or take the spacing of the delays that are tried.
-    spacing = 2.0 * (HALVES[1] - HALVES[0])
-    return 2.0 * shape - spacing, 2.0 * shape + spacing
+    # The slope is taken over the delay itself, give or take twice the spacing of the delays that are tried.
+    near = 4.0 * (HALVES[1] - HALVES[0])
+    return 2.0 * shape - near, 2.0 * shape + near
 
 
 def _grid(scales, joints):
@@ -47,8 +47,8 @@ def _grid(scales, joints):
 
 
 def _finer(grid, best):
-    step = np.diff(np.sort(grid[:, 0])).min()
-    return best[0] + np.linspace(-step, step, len(grid))[:, None]
+    # The half of the delay found and no other: beside it the slope over another time would be a delay of its own.
+    return np.broadcast_to(best, grid.shape)
 
 
 PRIOR = Prior(at_shape=_at_shape)

@@ -68,6 +68,7 @@ class Conditioned:
         shaken: Standard deviation of what encoder noise leaves in qdd in the band of the comparison [rad/s^2 or
             m/s^2], shape (n,).
         servo: What the servos were told, where their torque was not logged but made; else None.
+        recorded: False where samples are missing or a channel shows nothing, shape (T, n); None: where not `usable`.
     """
 
     source: str
@@ -87,6 +88,7 @@ class Conditioned:
     motion: int = -1
     repeats: int = 1
     servo: Commanded | None = None
+    recorded: np.ndarray | None = None
 
 
 def choose_band(recordings: list[Recording], robot: Robot) -> Band:
@@ -223,13 +225,14 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     if spikes:
         what = "torque spike was" if spikes == 1 else "torque spikes were"
         notes.append(f"{spikes} {what} replaced by the median of the neighbouring samples")
-    usable, began = ~resting & ~lost[:, None] & ~frozen, float(recording.t[0])
-    moving = (recording.source, grid, q, qd, qdd, tau, usable)
+    recorded, began = ~lost[:, None] & ~frozen, float(recording.t[0])
+    moving = (recording.source, grid, q, qd, qdd, tau, recorded & ~resting)
     q_noise = np.sqrt(0.5 * raw_rate * white)
     servo = _commanded(recording, t, anti_alias, grid) if has_torque else None
     if servo is not None:
         unsure = np.hypot(unsure, INEXACT * np.abs(filtered(tau, band.low_pass())))
-    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken, servo=servo)
+    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken, servo=servo,
+                       recorded=recorded)  # fmt: skip
 
 
 def _commanded(

@@ -10,7 +10,7 @@ import numpy as np
 
 from irb140_jax.effects import At, Effect
 from irb140_jax.effects.torque_gain import EFFECT as TORQUE_GAIN
-from irb140_jax.mismatch.columns.along import Loads, Prepared, unbounded, without
+from irb140_jax.mismatch.columns.along import Loads, Prepared, columns_along, unbounded, without
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
 from irb140_jax.mismatch.inertials.consistent import consistent
 from irb140_jax.robot import Robot, with_phi
@@ -105,6 +105,27 @@ class Torques:
     refit: np.ndarray
     loads: Loads
     corrected: np.ndarray
+
+
+def torques_of(
+    robot: Robot, named: Sequence[Named], along: Prepared, dphi_refit: np.ndarray, dphi_corrected: np.ndarray,
+    recording: int = -1,
+) -> Torques:  # fmt: skip
+    """A model's torques along a recording; what depends on the load sees that of the corrected model.
+
+    Args:
+        robot: The nominal model.
+        named: The effects.
+        along: The recording.
+        dphi_refit, dphi_corrected: Shift of the inertial parameters in either model, shape (10 n,).
+        recording: Its number; below 0 where the diagnosis did not see it.
+    """
+    lib, amplitudes = library_of(robot, named), [n.amplitudes for n in named]
+    shifts = dphi_refit, dphi_corrected
+    torques = composed(lib, along, columns_along(lib, along, None, recording), amplitudes, *shifts)
+    if not named:
+        return torques
+    return composed(lib, along, columns_along(lib, along, torques.loads, recording), amplitudes, *shifts)
 
 
 def composed(

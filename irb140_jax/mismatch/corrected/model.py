@@ -11,9 +11,10 @@ import numpy as np
 from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import known
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.columns.along import all_prepared, columns_along, seen_by
-from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, composed, library_of
+from irb140_jax.mismatch.columns.along import all_prepared, seen_by
+from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, torques_of
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
+from irb140_jax.mismatch.regression.tangent import late, point
 from irb140_jax.recordings.condition import Conditioned, condition
 from irb140_jax.recordings.drive import Drive
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
@@ -53,19 +54,16 @@ class CorrectedModel:
 
 def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     """The model's torques along a conditioned recording, on its grid."""
-    lib = library_of(model.robot, model.named)
     nominal_phi = np.asarray(model.robot.phi)
-    shifts = [(phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected)]
-    amplitudes = [named.amplitudes for named in model.named]
+    refit, corrected = ((phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected))
     (along,) = all_prepared(model.robot, [recording])
     along = seen_by(better_known(model.robot, model.phi_corrected, model.named), along)
-    torques = composed(lib, along, columns_along(lib, along), amplitudes, *shifts)
-    if model.named:
-        # Columns that depend on the load see the corrected one, as they did in the fit.
-        torques = composed(lib, along, columns_along(lib, along, torques.loads), amplitudes, *shifts)
+    torques = torques_of(model.robot, model.named, along, refit, corrected)
     if model.discrepancy is None:
         return torques
     rest = model.discrepancy.along(recording, torques.loads.load)
+    at, dt = point(model.robot, corrected, model.named), float(np.mean(np.diff(recording.t)))
+    rest = late(at, rest, np.arange(model.robot.n), dt)
     return dataclasses.replace(torques, corrected=torques.corrected + rest)
 
 

@@ -32,70 +32,75 @@ def of_bodies(
         identification, IEEE RA-L 3(1), 2018.
     """
     errors = into @ mean
-    links = [_Link.of(i, p, factor) for i, p in enumerate(phi)]
-    free = [link for link in links if link is not None]
-    if not any(link.impossible(errors[link.rows]) for link in free):
+    links = _Links.of(phi, factor)
+    rows = links.rows.ravel()
+    if not links.impossible(errors[links.rows]):
         return mean
-    rows = np.concatenate([link.rows for link in free])
     spread = (into @ cov @ into.T)[np.ix_(rows, rows)]
     spread = spread + 1e-12 * np.mean(np.diag(spread)) * np.eye(len(rows))
     whiten = linalg.solve_triangular(np.linalg.cholesky(spread), np.eye(len(rows)), lower=True)
-    each = lambda x: zip(free, x.reshape(-1, 10), strict=True)  # noqa: E731
-    off = lambda x: np.concatenate([link.errors(v) for link, v in each(x)]) - errors[rows]  # noqa: E731
-    slope = lambda x: whiten @ linalg.block_diag(*(link.slopes(v) for link, v in each(x)))  # noqa: E731
+    blocks = whiten.reshape(len(rows), -1, 10).swapaxes(0, 1)  # of each link's rows
+    off = lambda x: links.errors(x).ravel() - errors[rows]  # noqa: E731
     # From the nominal bodies: from the bounds of the impossible mean the search may stay far from the best.
-    start = np.tile(np.sqrt(1.0 - settings.LEAST_MASS) * np.eye(4)[LOWER], len(free))
+    start = np.tile(np.sqrt(1.0 - settings.LEAST_MASS) * np.eye(4)[LOWER], len(links.rows))
     best = optimize.least_squares(
-        lambda x: whiten @ off(x), start, slope, method="lm", max_nfev=TRIALS  # pyright: ignore[reportArgumentType]
-    ).x
+        lambda x: whiten @ off(x), start,
+        lambda x: np.concatenate([*(blocks @ links.slopes(x))], axis=1),  # pyright: ignore[reportArgumentType]
+        method="lm", max_nfev=TRIALS,
+    ).x  # fmt: skip
     return mean + (cov @ into.T)[:, rows] @ np.linalg.solve(spread, off(best))
 
 
 @dataclasses.dataclass(frozen=True)
-class _Link:
-    """A link's pseudo-inertia as its least one and a square, J = LEAST_MASS J_nominal + L (U U') L', J_nominal = L L'.
+class _Links:
+    """Links' pseudo-inertias as their least ones and squares, J = LEAST_MASS J_nominal + L (U U') L', J_nominal = L L'.
+
+    Of l links; those without nominal mass are not among them.
 
     Attributes:
-        rows: Of its inertials among all.
-        root: L, shape (4, 4).
-        phi: Nominal inertial parameters, shape (10,).
-        inverse: From inertial parameters to relative errors, shape (10, 10).
+        rows: Of their inertials among all, shape (l, 10).
+        root: L, shape (l, 4, 4).
+        phi: Nominal inertial parameters, shape (l, 10).
+        factor, inverse: From relative errors to inertial parameters and back, shape (l, 10, 10).
     """
 
     rows: np.ndarray
     root: np.ndarray
     phi: np.ndarray
+    factor: np.ndarray
     inverse: np.ndarray
 
     @staticmethod
-    def of(index: int, phi: np.ndarray, factor: np.ndarray) -> "_Link | None":
-        rows = 10 * index + np.arange(10)
-        try:
-            root = np.linalg.cholesky(pseudo_inertia(phi))
-            return _Link(rows, root, phi, np.linalg.inv(factor[np.ix_(rows, rows)]))
-        except np.linalg.LinAlgError:
-            return None
-
-    def _relative(self, errors: np.ndarray) -> np.ndarray:
-        """Pseudo-inertia in axes in which the nominal one is the unit matrix."""
-        J = pseudo_inertia(self.phi + np.linalg.solve(self.inverse, errors))
-        return linalg.solve_triangular(self.root, linalg.solve_triangular(self.root, J, lower=True).T, lower=True)
+    def of(phi: np.ndarray, factor: np.ndarray) -> "_Links":
+        bodies = [i for i, p in enumerate(phi) if np.linalg.eigvalsh(pseudo_inertia(p))[0] > 0.0]
+        rows = 10 * np.array(bodies, dtype=int)[:, None] + np.arange(10)
+        own = factor[rows[:, :, None], rows[:, None, :]]
+        return _Links(rows, np.linalg.cholesky(pseudo_inertia(phi[bodies])), phi[bodies], own, np.linalg.inv(own))
 
     def impossible(self, errors: np.ndarray) -> bool:
-        return bool(np.linalg.eigvalsh(self._relative(errors))[0] < settings.LEAST_MASS * (1.0 - 1e-6))
+        """Whether some link is below its least; `errors` are relative, shape (l, 10)."""
+        J = pseudo_inertia(self.phi + np.einsum("lij,lj->li", self.factor, errors))
+        inverse = np.linalg.inv(self.root)
+        relative = inverse @ J @ inverse.swapaxes(1, 2)  # in axes in which the nominal one is the unit matrix
+        return bool(np.any(np.linalg.eigvalsh(relative)[:, 0] < settings.LEAST_MASS * (1.0 - 1e-6)))
+
+    def _squares(self, x: np.ndarray) -> np.ndarray:
+        U = np.zeros((len(self.rows), 4, 4))
+        U[:, *LOWER] = x.reshape(-1, 10)
+        return U
 
     def errors(self, x: np.ndarray) -> np.ndarray:
-        U = np.zeros((4, 4))
-        U[LOWER] = x
-        J = self.root @ (settings.LEAST_MASS * np.eye(4) + U @ U.T) @ self.root.T
-        return self.inverse @ (parameters(J) - self.phi)
+        """Relative errors, shape (l, 10), at the lower triangles U, shape (10 l,)."""
+        U = self._squares(x)
+        J = self.root @ (settings.LEAST_MASS * np.eye(4) + U @ U.swapaxes(1, 2)) @ self.root.swapaxes(1, 2)
+        return np.einsum("lij,lj->li", self.inverse, parameters(J) - self.phi)
 
     def slopes(self, x: np.ndarray) -> np.ndarray:
-        U = np.zeros((4, 4))
-        U[LOWER] = x
-        half = STEPS @ U.T
-        turned = self.root @ (half + np.swapaxes(half, 1, 2)) @ self.root.T
-        return self.inverse @ parameters(turned).T
+        """Slopes of `errors`, shape (l, 10, 10), the second over the errors."""
+        half = STEPS @ self._squares(x)[:, None].swapaxes(2, 3)
+        root = self.root[:, None]
+        turned = parameters(root @ (half + half.swapaxes(2, 3)) @ root.swapaxes(2, 3))
+        return self.inverse @ turned.swapaxes(1, 2)
 
 
 LOWER = np.tril_indices(4)

@@ -19,6 +19,7 @@ from irb140_jax.mismatch.output.notes import (
     gap_notes,
     inertial_notes,
     notes,
+    rest_notes,
     timing_notes,
 )
 from irb140_jax.mismatch.output.servos import command_notes, harmful_notes, of_servos, servo_sentence
@@ -76,7 +77,8 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     fit, shifts = fit_by_joint(robot, of.proof, scatter), link_shifts(robot, of.ex)
     effects = {TORQUE_GAIN.slug: TORQUE_GAIN} | of.ex.lib.effects
     kind = verdict(of.ex, of.proof, found, of.rest, missing)
-    said = summary(kind, found, of.rest, fit, shifts, robot, len(of.data.recordings), missing.values(), effects)
+    moving = fit_by_joint(robot, of.proof, scatter, at_rest=False)
+    said = summary(kind, found, of.rest, moving, shifts, robot, len(of.data.recordings), missing.values(), effects)
     return rounded(Diagnosis(
         verdict=kind,
         findings=tuple(found),
@@ -132,9 +134,9 @@ def report_views(of: Found, said: tuple[str, ...], motion: dict[str, Any] | None
     ))  # fmt: skip
 
 
-def fit_by_joint(robot: Robot, proof: HeldOut, scatter: np.ndarray) -> dict[str, Fit]:
-    """Errors on unseen data and what the sensors scatter by; none where a joint was not judged."""
-    columns = (*(proof.rmse(x) for x in (proof.nominal, proof.refit, proof.corrected)), scatter)
+def fit_by_joint(robot: Robot, proof: HeldOut, scatter: np.ndarray, *, at_rest: bool = True) -> dict[str, Fit]:
+    """Errors on unseen data, in all rows or while the joint moves, and the sensors' scatter; none where not judged."""
+    columns = (*(proof.rmse(x, at_rest=at_rest) for x in (proof.nominal, proof.refit, proof.corrected)), scatter)
     return {
         name: Fit(*(float(column[j]) for column in columns)) if proof.judged[j] else Fit()
         for j, name in enumerate(robot.joint_names)
@@ -157,6 +159,7 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
     return [
         *of.data.servo_notes, *harmful_notes(robot, of.harmful), *open_joints,
+        *rest_notes(robot, of.proof, np.hypot(*of.sensors)),
         *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names),
         *clocks, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
         *notes(of.data, of.uncertainty, judged), *gap_notes(robot, gap, torque, lacking),

@@ -42,10 +42,29 @@ def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]
         return list(dict.fromkeys(out))
     out.append(
         f"Model and recordings are compared below {band.torque:.3g} Hz; positions were smoothed with a bandwidth of "
-        f"{band.position:.3g} Hz and differentiated. All figures of a joint leave out the rows in which it rests, "
-        "because dry friction is undetermined there."
+        f"{band.position:.3g} Hz and differentiated. Errors on unseen data are over all rows; everything else leaves "
+        "out those in which a joint rests, because dry friction is undetermined there."
     )
     return list(dict.fromkeys(out))
+
+
+def rest_notes(robot: Robot, proof: HeldOut, scatter: np.ndarray) -> list[str]:
+    """A note where most of the corrected model's squared error, beyond the sensors' scatter, is while a joint rests."""
+    squares = [
+        sum(np.sum(np.where(rows, x, 0.0) ** 2, axis=0) for x, rows in zip(proof.corrected, each, strict=True))
+        for each in (proof.recorded, proof.use)
+    ]
+    errors, out = [proof.rmse(x) for x in (proof.nominal, proof.refit, proof.corrected)], []
+    large = proof.rmse(proof.corrected, at_rest=True) > settings.ABOVE_NOISE * scatter
+    for j in np.flatnonzero(proof.judged & large & (squares[0] > 2.0 * squares[1])):
+        unit = "N" if robot.is_slide[j] else "N m"
+        nominal, refit, corrected = (f"{x[j]:.3g}" for x in errors)
+        out.append(
+            f"Most of the error of {robot.joint_names[j]} is in rows in which it rests, where dry friction is "
+            f"undetermined. While it moves, the error on unseen data is {nominal} {unit} with the model as given, "
+            f"{refit} with refitted inertials and {corrected} with the corrected model."
+        )
+    return out
 
 
 def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:

@@ -56,7 +56,7 @@ def summary(
 ) -> str:  # fmt: skip
     """A short paragraph for a person; `missing` are sentences on the data that a decision would need.
 
-    Effects go by their titles, by slug.
+    Effects go by their titles, by slug. `fit` is while joints move: at rest dry friction is undetermined.
     """
     what = _counted(recordings, robot)
     show = f"{what} show{'s' if recordings == 1 else ''}"
@@ -109,7 +109,8 @@ def _worst_error(robot: Robot, found: Sequence[Finding], fit: dict[str, Fit]) ->
     worst = max(concerned, key=lambda name: before(fit[name]) / max(fit[name].noise_floor or 0.0, 1e-12))
     f, unit = fit[worst], "N" if robot.is_slide[robot.joint_names.index(worst)] else "N m"
     return (
-        f"On unseen data the torque error of {worst} is {f.rmse_nominal:.3g} {unit} RMS with the model as given, "
+        f"On unseen data the torque error of {worst} while it moves is {f.rmse_nominal:.3g} {unit} RMS with the model "
+        "as given, "
         f"{f.rmse_refit:.3g} with refitted inertials and {f.rmse_corrected:.3g} with the corrected model; the "
         f"noise of the sensors is {f.noise_floor:.3g}."
     )

@@ -10,6 +10,7 @@ from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Prepared
 from irb140_jax.mismatch.regression.discrepancy import features
 from irb140_jax.mismatch.regression.servo import scale_width, servo_columns
+from irb140_jax.mismatch.regression.tangent import Point, delayed, late
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
@@ -56,8 +57,11 @@ def nuisances(
     torques: Sequence[tuple[np.ndarray, np.ndarray]],
     band: Band,
     scales: Scales,
+    at: Point | None = None,
 ) -> list[Nuisances]:
     """Columns of all recordings; features of the discrepancy have the RMS of the joint's torque over all of them.
+
+    What a lag or a delay was found in shows all of them as late as any other torque.
 
     Args:
         robot: The nominal model.
@@ -66,28 +70,31 @@ def nuisances(
             A torque scale multiplies the former: friction is stated in the torque that was logged.
         band: Of the comparison.
         scales: Sizes over all recordings.
+        at: Of the last explanation, if there is one.
     """
     n, count = robot.n, len(along)
     raw: list[list[list[np.ndarray]]] = []  # recording, joint, block
     commons = []
     for r, (a, (load, total)) in enumerate(zip(along, torques, strict=True)):
         motion, dt = a.recording, float(np.mean(np.diff(a.recording.t)))
-        rate = np.gradient(total, dt, axis=0)
-        bend = settings.SMOOTHED * np.gradient(rate, dt, axis=0)
-        common = settings.GAIN_COMMON * load, settings.DELAY_COMMON * rate, 2.0 * bend
+        rate = delayed(at, total, dt)
+        bend = settings.SMOOTHED * np.gradient(np.gradient(total, dt, axis=0), dt, axis=0)
+        rotor = settings.ROTOR_ERROR * np.asarray(robot.armature) * motion.qdd
+        bias = settings.BIAS * scales.torque * (1.0 - np.abs(motion.direction))
+        gain, bend, rotor, bias = (late(at, x, np.arange(n), dt) for x in (load, bend, rotor, bias))
+        common = settings.GAIN_COMMON * gain, settings.DELAY_COMMON * rate, 2.0 * bend
         commons.append(band.apply(np.stack(common, axis=-1)))
         joints = []
         for j in range(n):
-            rotor = settings.ROTOR_ERROR * float(robot.armature[j]) * motion.qdd[:, j]
-            bias = settings.BIAS * scales.torque[j] * (1.0 - np.abs(motion.direction[:, j]))
-            gain = np.hypot(settings.GAIN_JOINT, scale_width(motion, j)) * load[:, j]
-            fixed = np.stack([gain, settings.DELAY_JOINT * rate[:, j], rotor, bend[:, j], bias], axis=1)
-            fixed = np.concatenate([fixed, servo_columns(motion, j)], axis=1)
+            wide = np.hypot(settings.GAIN_JOINT, scale_width(motion, j))
+            fixed = (wide * gain[:, j], settings.DELAY_JOINT * rate[:, j], rotor[:, j], bend[:, j], bias[:, j])
+            fixed = np.concatenate([np.stack(fixed, axis=1), servo_columns(motion, j)], axis=1)
             # Levels of dry and viscous friction about their mean, a law's; of one recording there is nothing beside it.
             own = (np.arange(count) == r) - 1.0 / count if count > 1 else np.zeros(0)
             fast = motion.qd[:, [j]] / scales.speed[j]
             slope = np.concatenate([motion.direction[:, [j]] * own, fast * own], axis=1)
-            joints.append([band.apply(b) for b in (fixed, *features(motion, load, scales, j), slope)])
+            scaled = [late(at, x, np.full(x.shape[1], j), dt) for x in (*features(motion, load, scales, j), slope)]
+            joints.append([band.apply(b) for b in (fixed, *scaled)])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
     units = []

@@ -43,6 +43,7 @@ class Stretch:
         use: Rows in which the joint moves and nothing is lost, (R, n).
         q, qd, qdd: Motion at the rows, (R, n), for maps and the flexible competitor.
         motion, repeats: Which motion it is of, and of how many recordings that is; see `Conditioned`.
+        recorded: Rows in which nothing is lost, whether the joint moves or not, (R, n); None: those in `use`.
         tool, tool_jacobian: Where the tool is and how joints move it, (R, 3) and (R, n, 3); see `RigidBody`.
     """
 
@@ -66,6 +67,7 @@ class Stretch:
     tool_jacobian: np.ndarray
     motion: int = -1
     repeats: int = 1
+    recorded: np.ndarray | None = None
 
     def of(self, columns: np.ndarray, joint: int | None = None) -> np.ndarray:
         """Some columns, (R, n, columns), or those of one joint, (R, columns)."""
@@ -233,6 +235,7 @@ def bare_stretch(
         tau - band.apply(base) + band.apply(twice), rigid, tau, nominal, recording.unsure[kept],
         recording.usable[kept], recording.q[kept], recording.qd[kept], recording.qdd[kept],
         *tool_along(along.robot, recording.q[kept]), recording.motion, recording.repeats,
+        recording.usable[kept] if recording.recorded is None else recording.recorded[kept],
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ mostly in its own rate.  Both are as in Gauss and Newton's method: columns are s
 the products count twice is taken off.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -37,6 +38,11 @@ class Point(NamedTuple):
     dphi: np.ndarray
     log: tuple[Named, ...]
     rests_on: frozenset[tuple[str, tuple[int, ...]]]
+
+    @property
+    def timing(self) -> tuple[Named, ...]:
+        """Lags and delays."""
+        return tuple(law for law in self.log if law.effect.place.at is At.LOG_TIMING)
 
     @property
     def plain(self) -> bool:
@@ -107,6 +113,34 @@ def counted_twice(at: Point, loads: Loads, dt: float) -> np.ndarray:
         on = every if law.effect.place.everywhere else np.array(law.joints)
         source = loads.scaled if law.effect.place.at is At.LOG_TIMING else loads.total
         out[:, on] += _to_log(law, source[:, on], dt)
+    return out
+
+
+def late(at: Point | None, x: np.ndarray, joints: np.ndarray, dt: float) -> np.ndarray:
+    """`logged` by lags and delays alone, of what is stated as it is logged: that has the scale of the log already.
+
+    Args:
+        at: The point; None where nothing was found yet.
+        x, joints, dt: As there.
+    """
+    return logged(at._replace(log=at.timing), x, joints, dt) if at else x
+
+
+def delayed(at: Point | None, x: np.ndarray, dt: float) -> np.ndarray:
+    """What torques change by in the log, per second of delay beyond that found, shape (T, n).
+
+    Of a delay found it is the mean slope over that delay, its law's own column: a slope at its end beside it would let
+    the two differ in what they take off fast torques.
+
+    Args:
+        at: The point; None where nothing was found yet.
+        x: Torques, shape (T, n).
+        dt: Between samples [s].
+    """
+    out = np.gradient(x, dt, axis=0)
+    for law in at.timing if at else ():
+        on = np.arange(x.shape[1]) if law.effect.place.everywhere else np.array(law.joints)
+        out[:, on] = _to_log(dataclasses.replace(law, amplitudes=np.ones_like(law.amplitudes)), x[:, on], dt)
     return out
 
 

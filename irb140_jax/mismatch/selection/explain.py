@@ -8,9 +8,9 @@ import numpy as np
 
 from irb140_jax.effects import Effect, Scales
 from irb140_jax.mismatch import settings
-from irb140_jax.mismatch.columns.along import Loads, Prepared, all_prepared, columns_along, scales_of, seen_by
+from irb140_jax.mismatch.columns.along import Loads, Prepared, all_prepared, scales_of, seen_by
 from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, reshaped
-from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, composed, library_of
+from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, library_of, torques_of
 from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
 from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
@@ -122,7 +122,7 @@ def _explained(given: _Given, start: _Start, *, last: bool = False) -> Explanati
     each = [*zip(start.along, start.loads, strict=True)]
     rows = judged([bare_stretch(lib, r, i, band, given.factor, load, at) for i, (r, load) in enumerate(each)])
     known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in each]
-    extra = nuisances(lib.robot, start.along, known, band, given.scales)
+    extra = nuisances(lib.robot, start.along, known, band, given.scales, at)
     noise = start.noise or _first_noise(lib, rows, start.along, band, given.uncertainty, extra)
     columns = [partial(candidate_rows, lib, r, i, band, load, at) for i, (r, load) in enumerate(each)]
     sums = summed(lib, rows, columns, extra, noise)
@@ -157,7 +157,7 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> tuple[_Start, bool]:
     physics = _physics(found)
     better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
     along = [seen_by(better, r) for r in start.along]
-    torques = [_torques(robot, physics, found[0], r, i) for i, r in enumerate(along)]
+    torques = [torques_of(robot, physics, r, found[0], found[0], i) for i, r in enumerate(along)]
     noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
     coarse = _coarse(ex, noise)
     # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
@@ -184,16 +184,10 @@ def _by_block(ex: Explanation, sensors: np.ndarray) -> Explanation:
 
 
 def _physics(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:
-    """The effects of an explanation (see `fitted`) with their numbers."""
+    """The effects of an explanation (see `fitted`) with their numbers, and the shapes that follow from those."""
     _, members, amplitudes = found
-    return [Named(c.effect, c.joints, c.variant, w, c.shape) for c, w in zip(members, amplitudes, strict=True)]
-
-
-def _torques(robot: Robot, physics: Sequence[Named], dphi: np.ndarray, r: Prepared, index: int) -> Torques:
-    """Torques of effects and of shifted inertial parameters (10 n,) along a recording."""
-    lib = library_of(robot, physics)
-    columns = columns_along(lib, r, recording=index)
-    return composed(lib, r, columns, [named.amplitudes for named in physics], dphi, dphi)
+    both = [(c, w, c.effect.shapes.follows) for c, w in zip(members, amplitudes, strict=True)]
+    return [Named(c.effect, c.joints, c.variant, w, f(w, c.shape) if f else c.shape) for c, w, f in both]
 
 
 def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
@@ -233,8 +227,11 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
                     == (effect.slug, tuple(joints))]  # fmt: skip
             if mine and effect.shapes.finer:
                 best[mine[0]], peak = _peak(ex, mine[0])
-                follows = effect.shapes.follows or (lambda _, shape: shape)
-                new[s] = effect.shapes.finer(old[s], follows(amplitudes[mine[0]], peak))
+                if effect.shapes.follows and effect.prior.at_shape:
+                    # With laws that are taken for exact, amplitudes may be beyond those that the shape allows.
+                    allowed = np.clip(amplitudes[mine[0]], *effect.prior.at_shape(ex.data.candidates[mine[0]].shape))
+                    peak = effect.shapes.follows(allowed, peak)
+                new[s] = effect.shapes.finer(old[s], peak)
             elif effect.shapes.proposal and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)

@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from irb140_jax.effects import Scales
+from irb140_jax.effects import Effect, Scales
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.discrepancy import by_speed
@@ -97,7 +97,8 @@ def with_falling_friction(
         dry = [i for i in best if space.candidates[i].slug == DRY and space.candidates[i].joints == (j,)]
         laws = [i for i, c in enumerate(space.candidates) if c.effect.law.falls and c.joints == (j,)]
         moves = any(s.use[:, j].any() for s in data.stretches)
-        if not (dry and laws and moves):
+        here = [space.candidates[i].effect for i in best if space.candidates[i].joints == (j,)]
+        if not (dry and laws and moves) or any(bends(effect) for effect in here):
             continue
         odds = _curve(space, data, extra, scales, best, hyper, j).log_odds_of_fall()
         if odds < np.log(settings.NAMED / (1.0 - settings.NAMED)):
@@ -114,6 +115,11 @@ def with_falling_friction(
             mean, cov = space.functions(best, hyper, j, np.zeros((1, len(space.set_columns(best)))), own)
             falls[law] = Fall(odds, dry[0], float(np.sqrt(mean[0] ** 2 + cov[0, 0])))
     return best, hyper, falls
+
+
+def bends(effect: Effect) -> bool:
+    """Whether friction has a curve over speed by this law, beside which the discrepancy's says nothing alone."""
+    return VISCOUS in effect.law.contains
 
 
 def _curve(

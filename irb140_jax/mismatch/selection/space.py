@@ -65,7 +65,8 @@ def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
         alike, prior = kinds[c.slug, c.joints], -np.log(c.effect.shapes.scanned)
         if c.effect.shapes.follows and (at_shape := c.effect.prior.at_shape):
             # No parameter of its own: those that some amplitude may have share its prior, half either side of zero.
-            least, most = np.array([at_shape(o.shape) for o in alike])[:, :, 0].T
+            tried = np.unique([o.shape for o in alike], axis=0)
+            least, most = np.array([at_shape(shape) for shape in tried])[:, :, 0].T
             middle = np.mean(at_shape(c.shape))
             return float(prior - np.log(2.0 * np.sum((least <= middle) & (middle < most))))
         return float(prior - np.log(len(alike))) + narrowed.get((c.slug, c.joints), 0.0)

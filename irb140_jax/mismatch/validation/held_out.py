@@ -42,7 +42,8 @@ class HeldOut:
         left: The same, with errors of the instrument at joints where they explain some of it: what smoothing takes off
             accelerations is no physics.
         corrected: The same, with the discrepancy where it is carried.
-        use: Rows that count, (R, n).
+        use: Rows in which the joint moves, which count, (R, n).
+        recorded: All rows in which nothing is lost, (R, n).
         carried: Joints at which the discrepancy makes the error on unseen data smaller, shape (n,).
         folds: The fits behind them.
     """
@@ -53,6 +54,7 @@ class HeldOut:
     left: list[np.ndarray]
     corrected: list[np.ndarray]
     use: list[np.ndarray]
+    recorded: list[np.ndarray]
     carried: np.ndarray
     folds: tuple[Fold, ...] = ()
 
@@ -66,10 +68,11 @@ class HeldOut:
         corrected = [np.where(joints, n, c) for n, c in zip(self.named, self.corrected, strict=True)]
         return dataclasses.replace(self, corrected=corrected, carried=self.carried & ~joints)
 
-    def rmse(self, residuals: list[np.ndarray]) -> np.ndarray:
-        """RMS over the rows that count, shape (n,)."""
-        squares = sum(np.sum(np.where(u, r, 0.0) ** 2, axis=0) for r, u in zip(residuals, self.use, strict=True))
-        return np.sqrt(squares / np.maximum(sum(u.sum(axis=0) for u in self.use), 1))
+    def rmse(self, residuals: list[np.ndarray], *, at_rest: bool = False) -> np.ndarray:
+        """RMS over the rows in which each joint moves, or over all, shape (n,)."""
+        rows = self.recorded if at_rest else self.use
+        squares = sum(np.sum(np.where(u, r, 0.0) ** 2, axis=0) for r, u in zip(residuals, rows, strict=True))
+        return np.sqrt(squares / np.maximum(sum(u.sum(axis=0) for u in rows), 1))
 
 
 def folds(ex: Explanation) -> list[np.ndarray]:
@@ -201,8 +204,9 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
         [np.where(gains[k] > 0.0, better, named) for better, named in zip(out[k], out["named"], strict=True)]
         for k in ("flexible", "left")
     )
+    recorded = [s.use if s.recorded is None else s.recorded for s in data.stretches]
     return HeldOut(
-        nominal, out["refit"], out["named"], left, carried, use, gains["flexible"] > 0.0, tuple(fits)
+        nominal, out["refit"], out["named"], left, carried, use, recorded, gains["flexible"] > 0.0, tuple(fits)
     )
 
 
