@@ -37,9 +37,9 @@ def _to_log(x, dt, w, shape):
 
 
 def _at_shape(shape):
-    # The slope is taken over the delay itself, give or take twice the spacing of the delays that are tried.
-    near = 4.0 * (HALVES[1] - HALVES[0])
-    return 2.0 * shape - near, 2.0 * shape + near
+    # The slope is taken over the delay itself, give or take the spacing of the delays that are tried.
+    spacing = 2.0 * (HALVES[1] - HALVES[0])
+    return 2.0 * shape - spacing, 2.0 * shape + spacing
 
 
 def _grid(scales, joints):
