@@ -17,6 +17,8 @@ from testbed.statistics import calibration_error, covered, wilson
 
 ROOT = pathlib.Path(__file__).parents[1]
 LOOKS = ("first", "second", "third", "", "fifth", "sixth")  # labels of the looks at *check*
+# Labels of *check* under other conditions, as `testbed.runner` makes them.
+CONDITIONS = {"quiet": "noise and steps of the sensors / 10", "long": "recordings 10 times as long"}
 LEVELS = (0.5, 0.9, 0.99)
 WAYS = ("named", "in the class", "not testable", "unexplained", "missed")
 PLACES = ("located", "named alike", "noted", "not said")
@@ -103,20 +105,20 @@ def coverage(lines: Lines) -> Rows:
     return [(e, str(len(xs)), *(share(xs, level) for level in LEVELS)) for e, xs in sorted(by.items())]
 
 
-def looks_table(looks: list[Lines]) -> str:
-    """Every look at *check* in a row: the engine, and what came out."""
+def in_rows(what: str, runs: dict[str, Lines]) -> str:
+    """Runs over *check* in a row each: the engine, and what came out."""
     rows = []
-    for number, every in enumerate(looks, 1):
+    for name, every in runs.items():
         lines = [x for x in every if x["diagnosis"]]
         found = [i for x in lines for i in scoring.intervals(x)]
         classes = [c["size"] > 0 for x in lines for c in scoring.stated_classes(x) if c["slug"]]
         rows.append((
-            str(number), engines(every), str(len(every)),
+            name, engines(every), str(len(every)),
             f"{np.mean([len(scoring.false_names(x)) for x in lines]):.3f}",
-            f"{100 * np.mean([covered(v, s, true, 0.9) for *_, v, s, true in found]):.1f} %",
+            f"{100 * np.mean([covered(v, s, true, 0.9) for *_, v, s, true in found]):.1f} % of {len(found)}",
             f"{100 * np.mean(classes):.1f} %", _median([f for x in lines for f in scoring.floors(x)]),
         ))  # fmt: skip
-    head = ("look at *check*", "engine at commit", "cases run", "false names a case", "90 % intervals that hold",
+    head = (what, "engine at commit", "cases run", "false names a case", "90 % intervals that hold",
             "true effect in the stated class", "stated noise over the torque sensors', median")  # fmt: skip
     return markdown(head, rows)
 
@@ -212,6 +214,8 @@ def engines(lines: Lines) -> str:
 def main() -> None:
     """Write the page and its figures."""
     looks = [look for look in (runner.read(runner.stored("check", label)) for label in LOOKS) if look]
+    conditions = {said: runner.read(runner.stored("check", label)) for label, said in CONDITIONS.items()}
+    conditions = {said: every for said, every in conditions.items() if any(x["diagnosis"] for x in every)}
     draws = {"final": runner.read(runner.stored("final")), "check": looks[-1]}
     draws = {name: every for name, every in draws.items() if any(x["diagnosis"] for x in every)}
     for name, every in draws.items():
@@ -224,7 +228,8 @@ def main() -> None:
         (pathlib.Path(__file__).parent / "calibration.md.j2").read_text(encoding="utf-8")
     ).render(
         mixture=", ".join(f"{n} {name}" if n > 1 else name for name, n in many.items()),
-        looks=looks_table(looks),
+        looks=in_rows("look at *check*", {str(number): every for number, every in enumerate(looks, 1)}),
+        conditions=in_rows("cases of *check* with", conditions) if conditions else "",
         draws=[section(name, every, runner.read(runner.stored(name, "first"))) for name, every in draws.items()],
         probes=markdown(head, [probe_row(x) for x in probes]) if probes else "", probes_engine=engines(probes),
         narrower=narrower(probes),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from irb140_jax.mismatch import diagnose
+from irb140_jax.mismatch.output.notes import rest_notes
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.mismatch.validation.undecided_joints import undecidable
 from irb140_jax.recordings.low_pass import Band
@@ -57,3 +58,17 @@ def test_errors_are_those_of_the_rows_that_are_asked_for():
     some = dataclasses.replace(some, use=[moves], recorded=[recorded])
     np.testing.assert_allclose(some.rmse(error), [3.0])
     np.testing.assert_allclose(some.rmse(error, at_rest=True), [np.sqrt(18.0)])
+
+
+@pytest.mark.parametrize(("at_rest", "scatter", "told"), [(5.0, 0.1, True), (5.0, 5.0, False), (0.5, 0.1, False)])
+def test_errors_while_a_joint_moves_are_told_where_most_of_the_error_is_at_rest(at_rest, scatter, told):
+    moves = np.arange(100)[:, None] < 60
+    error = lambda moving: [np.where(moves, moving, at_rest)]  # noqa: E731
+    some = dataclasses.replace(
+        proof(1.0, 100), nominal=error(3.0), refit=error(2.0), corrected=error(1.0), use=[moves],
+        recorded=[np.ones_like(moves)],
+    )  # fmt: skip
+    notes = rest_notes(made.robot(pendulum=True), some, np.array([scatter]))
+    assert len(notes) == told
+    if told:
+        assert all(part in notes[0] for part in ("rests", "is 3 N", "2 with refitted", "1 with the corrected"))

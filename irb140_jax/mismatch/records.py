@@ -16,15 +16,15 @@ def rounded(x: Any, to: int = 6) -> Any:
         x: A record, or dictionaries, lists and tuples, of numbers and whatever else.
         to: How many.
     """
+    if isinstance(x, float | np.floating):  # most of what there is
+        value = float(x)
+        return float(f"{value:.{to}g}") if math.isfinite(value) else None
+    if isinstance(x, list | tuple):
+        return type(x)([rounded(v, to) for v in x])
     if dataclasses.is_dataclass(x) and not isinstance(x, type):
         return dataclasses.replace(x, **{f.name: rounded(getattr(x, f.name), to) for f in dataclasses.fields(x)})
     if isinstance(x, dict):
         return {k: rounded(v, to) for k, v in x.items()}
-    if isinstance(x, list | tuple):
-        return type(x)([rounded(v, to) for v in x])
-    if isinstance(x, float | np.floating):
-        value = float(x)
-        return float(f"{value:.{to}g}") if math.isfinite(value) else None
     return x.item() if isinstance(x, np.generic) else x
 
 

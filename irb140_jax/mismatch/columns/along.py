@@ -111,21 +111,23 @@ def pieces(samples: int) -> list[slice]:
     return [slice(k, min(k + CHUNK, samples)) for k in range(0, samples, CHUNK)]
 
 
-def prepared(robot: Robot, recording: Conditioned, *, kept: bool = True) -> Prepared:
+def prepared(robot: Robot, recording: Conditioned, *, seen: Robot | None = None, kept: bool = True) -> Prepared:
     """Evaluate the rigid body along a recording.
 
     Args:
         robot: The nominal model.
         recording: T samples.
+        seen: The robot whose slopes shape the effects, if it is another; see `seen_by`.
         kept: Whether regressor and sensitivities are held for the next time that they are needed.
     """
     motor_side = np.asarray(robot.armature) * recording.qdd + _friction(robot, recording)
     spring = np.asarray(robot.stiffness) * (recording.q - np.asarray(robot.springref))
     phi, links, bodies, regressors = np.asarray(robot.phi).ravel(), [], [], []
+    seen = robot if seen is None else seen
     inertia = np.zeros(robot.n)
     for at in pieces(len(recording.t)):
         Y = _regressor(robot, recording, at)
-        rigid = _sensitivities(robot, recording, at, Y[..., -10:])
+        rigid = _sensitivities(seen, recording, at, Y[..., -10:])
         links.append(Y @ phi)
         inertia += np.diagonal(rigid.mass, axis1=1, axis2=2).sum(axis=0)
         if kept:
@@ -134,13 +136,13 @@ def prepared(robot: Robot, recording: Conditioned, *, kept: bool = True) -> Prep
     nominal = np.concatenate(links) + motor_side + spring
     whole = (np.concatenate(regressors), _joined(bodies)) if kept else (None, None)
     turns, inertia = [turning_points(q) for q in recording.q.T], inertia / len(recording.t)
-    return Prepared(robot, robot, recording, nominal, motor_side, inertia, turns, *whole)
+    return Prepared(robot, seen, recording, nominal, motor_side, inertia, turns, *whole)
 
 
-def all_prepared(robot: Robot, recordings: Sequence[Conditioned]) -> list[Prepared]:
+def all_prepared(robot: Robot, recordings: Sequence[Conditioned], seen: Robot | None = None) -> list[Prepared]:
     """The rigid body along recordings; what it takes to keep it is kept where that is not much."""
     kept = sum(len(r.t) for r in recordings) <= KEPT
-    return [prepared(robot, r, kept=kept) for r in recordings]
+    return [prepared(robot, r, seen=seen, kept=kept) for r in recordings]
 
 
 def seen_by(robot: Robot, along: Prepared) -> Prepared:

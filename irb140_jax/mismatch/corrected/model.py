@@ -11,7 +11,7 @@ import numpy as np
 from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import known
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch.columns.along import all_prepared, seen_by
+from irb140_jax.mismatch.columns.along import all_prepared
 from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, torques_of
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.regression.tangent import late, point
@@ -56,8 +56,8 @@ def torques_along(model: CorrectedModel, recording: Conditioned) -> Torques:
     """The model's torques along a conditioned recording, on its grid."""
     nominal_phi = np.asarray(model.robot.phi)
     refit, corrected = ((phi - nominal_phi).ravel() for phi in (model.phi_refit, model.phi_corrected))
-    (along,) = all_prepared(model.robot, [recording])
-    along = seen_by(better_known(model.robot, model.phi_corrected, model.named), along)
+    better = better_known(model.robot, model.phi_corrected, model.named)
+    (along,) = all_prepared(model.robot, [recording], better)
     torques = torques_of(model.robot, model.named, along, refit, corrected)
     if model.discrepancy is None:
         return torques
