@@ -81,7 +81,7 @@ def as_conditioned(m, rest=REST):
     usable = np.ones_like(m.q, dtype=bool)
     speeds = np.full(m.q.shape[1], rest)
     tau, direction, exact = 0.0 * m.q, np.tanh(m.qd / speeds), 0.0 * speeds
-    return Conditioned("made", m.t, m.q, m.qd, m.qdd, tau, usable, speeds, exact, direction, 0.0 * m.q, ())
+    return Conditioned("made", m.t, m.q, m.qd, m.qdd, tau, usable, usable, speeds, exact, direction, 0.0 * m.q, ())
 
 
 def test_the_jax_model_gives_the_torque_that_predict_gives_with_every_effect_at_once():

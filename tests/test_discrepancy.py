@@ -20,8 +20,9 @@ SIGN = np.tanh(QD / 0.01)
 def features(only: slice = slice(None)) -> np.ndarray:
     """Blocks along the motion, by default all of them, columns of RMS one, shape (T, 82)."""
     column = lambda x: np.asarray(x)[:, None]  # noqa: E731
+    moves = np.ones((len(T), 1), bool)
     motion = Conditioned(
-        "motion", T, column(Q), column(QD), column(QDD), column(LOAD), np.ones((len(T), 1), bool), np.array([0.01]),
+        "motion", T, column(Q), column(QD), column(QDD), column(LOAD), moves, moves, np.array([0.01]),
         np.zeros(1), column(SIGN), np.zeros((len(T), 1)), (),
     )  # fmt: skip
     one = lambda x: np.array([x])  # noqa: E731

@@ -32,7 +32,7 @@ def stretches(seed: int, rows: int = 70, recordings: int = 2) -> list[Stretch]:
         zero = np.zeros((rows, JOINTS))
         t = np.arange(rows) / 50.0
         links, held, amplitudes = X[..., :NUISANCES], np.arange(AMPLITUDES), X[..., NUISANCES:]
-        of_log = y, links, y, zero, zero, use, zero, zero, zero, zero, zero
+        of_log = y, links, y, zero, zero, use, use, zero, zero, zero, zero, zero
         out.append(Stretch(r, t, 0.0, AMPLITUDES, links, held, amplitudes, *of_log))
     return out
 

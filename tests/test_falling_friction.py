@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch.selection.falling_friction import Curve, bends
+from irb140_jax.mismatch.selection.falling_friction import Curve, has_own_viscous_friction
 
 SPEED = np.geomspace(0.01, 1.0, 16)
 RISING = 1.0 + 0.5 * SPEED
@@ -62,7 +62,7 @@ def test_friction_known_at_one_speed_alone_is_no_curve():
     assert Curve(same, np.ones(16), 1e-4 * np.eye(16), np.eye(16)).log_odds_of_fall() == -np.inf
 
 
-def test_laws_that_bend_over_speed_are_known():
-    assert {slug for slug, effect in CATALOGUE.items() if bends(effect)} == {
+def test_friction_whose_curve_is_not_dry_and_viscous_friction_alone_is_known():
+    assert {slug for slug, effect in CATALOGUE.items() if has_own_viscous_friction(effect)} == {
         "nonlinear_viscous_friction", "thermal_friction_drift"
     }  # fmt: skip

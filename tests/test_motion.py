@@ -49,8 +49,8 @@ def recorded(seconds: float = 6.0, viscous: float = VISCOUS, torque_scale: float
         data.qpos[:], data.qvel[:], data.qacc[:] = q[i], qd[i], qdd[i]
         mujoco.mj_inverse(model, data)
         tau[i] = data.qfrc_inverse + np.array([viscous, 0.0]) * qd[i]
-    one = np.ones(2)
-    return Conditioned("r", t, q, qd, qdd, torque_scale * tau, np.ones(q.shape, bool), 0.01 * one, 1e-5 * one,
+    one, moves = np.ones(2), np.ones(q.shape, bool)
+    return Conditioned("r", t, q, qd, qdd, torque_scale * tau, moves, moves, 0.01 * one, 1e-5 * one,
                        np.sign(qd), 0.0 * q, ())  # fmt: skip
 
 

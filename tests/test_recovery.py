@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import Result, diagnose, predict
@@ -180,3 +181,17 @@ def test_nothing_is_named_where_nothing_is_hidden(seed, joints, slides):
     assert diagnosis["findings"] == [] and diagnosis["unexplained"] == []
     assert diagnosis["verdict"] in ("no_mismatch", "parameters_only")
     assert any(robot.is_slide) == (slides > 0.0)
+
+
+def test_a_filtered_log_is_one_delay_that_settles_in_few_rounds():
+    robot, case = machine(1, JOINTS, 0.0)
+    cut, said = 12.0, []
+    low_pass = signal.butter(2, cut, fs=500.0, output="sos")
+    filtered = lambda x: x[0] + np.asarray(signal.sosfilt(low_pass, x - x[0], axis=0))  # noqa: E731
+    recordings = [dataclasses.replace(r, tau=filtered(r.tau)) for r in case.recordings]
+    (finding,) = diagnose(robot, recordings, progress=said.append).diagnosis.findings
+    assert finding.effect == "time_delay" and finding.joints == robot.joint_names
+    # Of slow motion a Butterworth filter of second order delays by sqrt(2) / (2 pi cut): 18.8 ms.
+    delay = finding.parameters["delay"].value
+    assert delay == pytest.approx(-np.sqrt(2.0) / (2.0 * np.pi * cut), abs=1.5e-4)
+    assert sum("columns of" in sentence for sentence in said) <= 4

@@ -55,7 +55,7 @@ def test_errors_are_those_of_the_rows_that_are_asked_for():
     moves = np.array([[True], [True], [False], [False]])
     recorded = np.array([[True], [True], [True], [False]])
     error = [np.array([[3.0], [3.0], [6.0], [100.0]])]
-    some = dataclasses.replace(some, use=[moves], recorded=[recorded])
+    some = dataclasses.replace(some, recorded=[recorded], use=[moves])
     np.testing.assert_allclose(some.rmse(error), [3.0])
     np.testing.assert_allclose(some.rmse(error, at_rest=True), [np.sqrt(18.0)])
 
@@ -65,8 +65,8 @@ def test_errors_while_a_joint_moves_are_told_where_most_of_the_error_is_at_rest(
     moves = np.arange(100)[:, None] < 60
     error = lambda moving: [np.where(moves, moving, at_rest)]  # noqa: E731
     some = dataclasses.replace(
-        proof(1.0, 100), nominal=error(3.0), refit=error(2.0), corrected=error(1.0), use=[moves],
-        recorded=[np.ones_like(moves)],
+        proof(1.0, 100), nominal=error(3.0), refit=error(2.0), corrected=error(1.0),
+        recorded=[np.ones_like(moves)], use=[moves],
     )  # fmt: skip
     notes = rest_notes(made.robot(pendulum=True), some, np.array([scatter]))
     assert len(notes) == told

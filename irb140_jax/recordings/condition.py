@@ -55,7 +55,8 @@ class Conditioned:
         t: Time [s], shape (T,).
         q, qd, qdd: Smoothed motion, shape (T, n).
         tau: Logged torque without spikes, anti-aliased to the grid [N m or N], shape (T, n).
-        usable: False where a joint rests (dry friction is undetermined there) or samples are missing, shape (T, n).
+        recorded: False where samples are missing or a torque channel shows nothing, shape (T, n).
+        usable: The same, and False where a joint rests: dry friction is undetermined there, shape (T, n).
         rest_speed: Speed that encoder noise can't tell from rest, shape (n,).
         q_noise: Standard deviation of the logged positions' white noise [rad or m], shape (n,).
         direction: sign(qd), and what stands for it near rest (see `direction_of`), anti-aliased as the torque, shape
@@ -68,7 +69,6 @@ class Conditioned:
         shaken: Standard deviation of what encoder noise leaves in qdd in the band of the comparison [rad/s^2 or
             m/s^2], shape (n,).
         servo: What the servos were told, where their torque was not logged but made; else None.
-        recorded: False where samples are missing or a channel shows nothing, shape (T, n); None: where not `usable`.
     """
 
     source: str
@@ -77,6 +77,7 @@ class Conditioned:
     qd: np.ndarray
     qdd: np.ndarray
     tau: np.ndarray
+    recorded: np.ndarray
     usable: np.ndarray
     rest_speed: np.ndarray
     q_noise: np.ndarray
@@ -88,7 +89,6 @@ class Conditioned:
     motion: int = -1
     repeats: int = 1
     servo: Commanded | None = None
-    recorded: np.ndarray | None = None
 
 
 def choose_band(recordings: list[Recording], robot: Robot) -> Band:
@@ -226,13 +226,12 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
         what = "torque spike was" if spikes == 1 else "torque spikes were"
         notes.append(f"{spikes} {what} replaced by the median of the neighbouring samples")
     recorded, began = ~lost[:, None] & ~frozen, float(recording.t[0])
-    moving = (recording.source, grid, q, qd, qdd, tau, recorded & ~resting)
+    moving = (recording.source, grid, q, qd, qdd, tau, recorded, recorded & ~resting)
     q_noise = np.sqrt(0.5 * raw_rate * white)
     servo = _commanded(recording, t, anti_alias, grid) if has_torque else None
     if servo is not None:
         unsure = np.hypot(unsure, INEXACT * np.abs(filtered(tau, band.low_pass())))
-    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken, servo=servo,
-                       recorded=recorded)  # fmt: skip
+    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken, servo=servo)
 
 
 def _commanded(

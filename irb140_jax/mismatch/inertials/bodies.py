@@ -6,7 +6,7 @@ import numpy as np
 from scipy import linalg, optimize
 
 from irb140_jax.mismatch import settings
-from irb140_jax.mismatch.inertials.consistent import parameters, pseudo_inertia
+from irb140_jax.mismatch.inertials.consistent import is_body, parameters, pseudo_inertia
 
 TRIALS = 300  # evaluations of the search; thirty are usual, and more where many bounds are met
 
@@ -16,8 +16,8 @@ def of_bodies(
 ) -> np.ndarray:
     """The mean of a Gaussian moved to the most probable inertials that bodies can have.
 
-    Each link's pseudo-inertia is kept at or above `LEAST_MASS` times its nominal one; a link without nominal mass is
-    left alone.  All else moves along as it is correlated with the inertials.
+    Each link's pseudo-inertia is kept at or above `LEAST_MASS` times its nominal one; a link whose nominal inertials
+    are those of no body is left alone.  All else moves along as it is correlated with the inertials.
 
     Args:
         mean, cov: Of K unknowns, shape (K,) and (K, K).
@@ -55,7 +55,7 @@ def of_bodies(
 class _Links:
     """Links' pseudo-inertias as their least ones and squares, J = LEAST_MASS J_nominal + L (U U') L', J_nominal = L L'.
 
-    Of l links; those without nominal mass are not among them.
+    Of l links; those whose nominal inertials are those of no body are not among them.
 
     Attributes:
         rows: Of their inertials among all, shape (l, 10).
@@ -72,7 +72,7 @@ class _Links:
 
     @staticmethod
     def of(phi: np.ndarray, factor: np.ndarray) -> "_Links":
-        bodies = [i for i, p in enumerate(phi) if np.linalg.eigvalsh(pseudo_inertia(p))[0] > 0.0]
+        bodies = [i for i, p in enumerate(phi) if is_body(p)]
         rows = 10 * np.array(bodies, dtype=int)[:, None] + np.arange(10)
         own = factor[rows[:, :, None], rows[:, None, :]]
         return _Links(rows, np.linalg.cholesky(pseudo_inertia(phi[bodies])), phi[bodies], own, np.linalg.inv(own))
@@ -96,7 +96,7 @@ class _Links:
         return np.einsum("lij,lj->li", self.inverse, parameters(J) - self.phi)
 
     def slopes(self, x: np.ndarray) -> np.ndarray:
-        """Slopes of `errors`, shape (l, 10, 10), the second over the errors."""
+        """Slopes of the errors over the elements of U, shape (l, 10 errors, 10 elements)."""
         half = STEPS @ self._squares(x)[:, None].swapaxes(2, 3)
         root = self.root[:, None]
         turned = parameters(root @ (half + half.swapaxes(2, 3)) @ root.swapaxes(2, 3))

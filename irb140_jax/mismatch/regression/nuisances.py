@@ -61,7 +61,7 @@ def nuisances(
 ) -> list[Nuisances]:
     """Columns of all recordings; features of the discrepancy have the RMS of the joint's torque over all of them.
 
-    What a lag or a delay was found in shows all of them as late as any other torque.
+    Where the log was found to be late, these columns are as late as its torque.
 
     Args:
         robot: The nominal model.
@@ -88,6 +88,7 @@ def nuisances(
         for j in range(n):
             wide = np.hypot(settings.GAIN_JOINT, scale_width(motion, j))
             fixed = (wide * gain[:, j], settings.DELAY_JOINT * rate[:, j], rotor[:, j], bend[:, j], bias[:, j])
+            # A servo's torque is made of commands and positions: it is never late against them.
             fixed = np.concatenate([np.stack(fixed, axis=1), servo_columns(motion, j)], axis=1)
             # Levels of dry and viscous friction about their mean, a law's; of one recording there is nothing beside it.
             own = (np.arange(count) == r) - 1.0 / count if count > 1 else np.zeros(0)

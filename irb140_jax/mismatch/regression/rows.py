@@ -40,10 +40,10 @@ class Stretch:
         tau: Logged torque, low-passed, (R, n).
         nominal: Nominal torque, low-passed, (R, n).
         unsure: Standard deviation that the samples of the log leave open of tau, (R, n); see `Conditioned`.
-        use: Rows in which the joint moves and nothing is lost, (R, n).
+        recorded: Rows in which nothing is lost, (R, n).
+        use: Those of them in which the joint moves, (R, n).
         q, qd, qdd: Motion at the rows, (R, n), for maps and the flexible competitor.
         motion, repeats: Which motion it is of, and of how many recordings that is; see `Conditioned`.
-        recorded: Rows in which nothing is lost, whether the joint moves or not, (R, n); None: those in `use`.
         tool, tool_jacobian: Where the tool is and how joints move it, (R, 3) and (R, n, 3); see `RigidBody`.
     """
 
@@ -59,6 +59,7 @@ class Stretch:
     tau: np.ndarray
     nominal: np.ndarray
     unsure: np.ndarray
+    recorded: np.ndarray
     use: np.ndarray
     q: np.ndarray
     qd: np.ndarray
@@ -67,7 +68,6 @@ class Stretch:
     tool_jacobian: np.ndarray
     motion: int = -1
     repeats: int = 1
-    recorded: np.ndarray | None = None
 
     def of(self, columns: np.ndarray, joint: int | None = None) -> np.ndarray:
         """Some columns, (R, n, columns), or those of one joint, (R, columns)."""
@@ -233,9 +233,8 @@ def bare_stretch(
     return Stretch(
         index, recording.t[kept], recording.began, lib.size, inertials, held, none,
         tau - band.apply(base) + band.apply(twice), rigid, tau, nominal, recording.unsure[kept],
-        recording.usable[kept], recording.q[kept], recording.qd[kept], recording.qdd[kept],
+        recording.recorded[kept], recording.usable[kept], recording.q[kept], recording.qd[kept], recording.qdd[kept],
         *tool_along(along.robot, recording.q[kept]), recording.motion, recording.repeats,
-        recording.usable[kept] if recording.recorded is None else recording.recorded[kept],
     )  # fmt: skip
 
 

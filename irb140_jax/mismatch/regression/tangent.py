@@ -117,17 +117,19 @@ def counted_twice(at: Point, loads: Loads, dt: float) -> np.ndarray:
 
 
 def late(at: Point | None, x: np.ndarray, joints: np.ndarray, dt: float) -> np.ndarray:
-    """`logged` by lags and delays alone, of what is stated as it is logged: that has the scale of the log already.
+    """Torques as late as the log has them, a copy where it has them late: what the log makes of them but for its scale.
 
     Args:
         at: The point; None where nothing was found yet.
-        x, joints, dt: As there.
+        x: Torques, shape (T, any), in the scale of the log.
+        joints: The joint of each, shape (any,).
+        dt: Between samples [s].
     """
     return logged(at._replace(log=at.timing), x, joints, dt) if at else x
 
 
 def delayed(at: Point | None, x: np.ndarray, dt: float) -> np.ndarray:
-    """What torques change by in the log, per second of delay beyond that found, shape (T, n).
+    """By how much logged torques change per second of delay more than was found, shape (T, n) [N m/s or N/s].
 
     Of a delay found it is the mean slope over that delay, its law's own column: a slope at its end beside it would let
     the two differ in what they take off fast torques.

@@ -98,7 +98,7 @@ def with_falling_friction(
         laws = [i for i, c in enumerate(space.candidates) if c.effect.law.falls and c.joints == (j,)]
         moves = any(s.use[:, j].any() for s in data.stretches)
         here = [space.candidates[i].effect for i in best if space.candidates[i].joints == (j,)]
-        if not (dry and laws and moves) or any(bends(effect) for effect in here):
+        if not (dry and laws and moves) or any(map(has_own_viscous_friction, here)):
             continue
         odds = _curve(space, data, extra, scales, best, hyper, j).log_odds_of_fall()
         if odds < np.log(settings.NAMED / (1.0 - settings.NAMED)):
@@ -117,8 +117,8 @@ def with_falling_friction(
     return best, hyper, falls
 
 
-def bends(effect: Effect) -> bool:
-    """Whether friction has a curve over speed by this law, beside which the discrepancy's says nothing alone."""
+def has_own_viscous_friction(effect: Effect) -> bool:
+    """Whether a law holds viscous friction in a form of its own: `_curve` lacks it, and is not all of the friction."""
     return VISCOUS in effect.law.contains
 
 

@@ -42,8 +42,7 @@ class HeldOut:
         left: The same, with errors of the instrument at joints where they explain some of it: what smoothing takes off
             accelerations is no physics.
         corrected: The same, with the discrepancy where it is carried.
-        use: Rows in which the joint moves, which count, (R, n).
-        recorded: All rows in which nothing is lost, (R, n).
+        recorded, use: Rows in which nothing is lost, and those of them in which the joint moves, (R, n) each.
         carried: Joints at which the discrepancy makes the error on unseen data smaller, shape (n,).
         folds: The fits behind them.
     """
@@ -53,8 +52,8 @@ class HeldOut:
     named: list[np.ndarray]
     left: list[np.ndarray]
     corrected: list[np.ndarray]
-    use: list[np.ndarray]
     recorded: list[np.ndarray]
+    use: list[np.ndarray]
     carried: np.ndarray
     folds: tuple[Fold, ...] = ()
 
@@ -199,14 +198,14 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
             for which, gain in gains.items():
                 old, new = (np.where(s.use, unseen[k], 0.0)[rows] for k in ("named", which))
                 gain += np.sum(old**2 - new**2, axis=0)
-    nominal, use = [s.tau - s.nominal for s in data.stretches], [s.use for s in data.stretches]
+    nominal = [s.tau - s.nominal for s in data.stretches]
+    recorded, use = [s.recorded for s in data.stretches], [s.use for s in data.stretches]
     carried, left = (
         [np.where(gains[k] > 0.0, better, named) for better, named in zip(out[k], out["named"], strict=True)]
         for k in ("flexible", "left")
     )
-    recorded = [s.use if s.recorded is None else s.recorded for s in data.stretches]
     return HeldOut(
-        nominal, out["refit"], out["named"], left, carried, use, recorded, gains["flexible"] > 0.0, tuple(fits)
+        nominal, out["refit"], out["named"], left, carried, recorded, use, gains["flexible"] > 0.0, tuple(fits)
     )
 
 

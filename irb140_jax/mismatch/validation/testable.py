@@ -98,7 +98,7 @@ def played(motion: Excitation, rest_speed: np.ndarray) -> Conditioned:
     around = 2 * int(np.ceil(settings.LEAK / (motion.t[1] - motion.t[0]))) + 1
     usable = ~ndimage.maximum_filter1d(rounded.astype(np.uint8), around, axis=0).astype(bool)
     direction, torque = np.tanh(motion.qd / rest_speed), np.zeros_like(motion.q)
-    moving = (motion.name, motion.t, motion.q, motion.qd, motion.qdd, torque, usable)
+    moving = (motion.name, motion.t, motion.q, motion.qd, motion.qdd, torque, usable, usable)
     return Conditioned(*moving, rest_speed, np.zeros_like(rest_speed), direction, np.zeros_like(motion.q), ())
 
 
