@@ -240,23 +240,6 @@ def test_a_reversal_is_no_rest():
     assert r.usable.all()
 
 
-def test_spikes_are_taken_off_the_torque_and_told():
-    t, rng = times(), np.random.default_rng(3)
-    clean = 5.0 * np.sin(3.0 * t) + 0.05 * rng.normal(size=len(t))
-    spiked = clean.copy()
-    spiked[rng.choice(len(t), 12, replace=False)] += 100.0
-    with_spikes, without = (condition(logged(t, wave(t)[0], tau), BAND) for tau in (spiked, clean))
-    # Local medians instead of 12 samples, of a slope of 0.03 a sample and noise of 0.05.
-    assert np.max(np.abs(with_spikes.tau - without.tau)) < 0.3
-    assert "12 torque spikes" in with_spikes.notes[-1] and not without.notes
-
-
-def test_steps_and_flat_tops_of_the_torque_are_no_spikes():
-    t = times()
-    square = np.sign(np.sin(2.0 * np.pi * t)) + 0.02 * np.random.default_rng(4).normal(size=len(t))
-    assert condition(logged(t, wave(t)[0], square), BAND).notes == ()
-
-
 def test_notes_of_the_recording_are_kept():
     recording = dataclasses.replace(logged(times(), wave(times())[0]), notes=("joint1 was in degrees",))
     assert condition(recording, BAND).notes == ("joint1 was in degrees",)

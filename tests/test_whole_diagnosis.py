@@ -38,3 +38,12 @@ def test_friction_that_falls_as_the_speed_rises_is_named_whatever_the_form_of_it
     # No other law holds the joint's dry friction, and what else is named there has odds of its own.
     assert not any(f["effect"] == "coulomb_friction" and f["joints"] == ["j2"] for f in line["diagnosis"]["findings"])
     assert all(f["evidence"]["log_odds"] > 0.0 for f in line["diagnosis"]["findings"])
+
+
+def test_play_is_found_by_its_blows_which_no_repair_takes_for_spikes():
+    line = said(220)  # 500 Hz, blows of some samples on j3
+    assert not any("spike" in n for n in line["diagnosis"]["notes"])
+    (play,) = [f for f in line["diagnosis"]["findings"] if f["effect"] == "backlash"]
+    true = next(h["parameters"]["gap"] for h in line["truth"]["hidden"] if h["slug"] == "backlash")
+    gap = play["parameters"]["gap"]
+    assert play["joints"] == ["j3"] and abs(gap["value"] - true) < 2.6 * gap["std"] and gap["std"] < 0.1 * true

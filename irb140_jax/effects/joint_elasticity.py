@@ -10,7 +10,8 @@ from irb140_jax.effects.records import At, Export, Law, Parameter, Place, Prior,
 
 DAMPING = 0.05  # of the link on its spring, relative to critical: what harmonic drives show (Spong; Tuttle and Seering)
 MODES = (6.0, 80.0)  # Hz; softer is no robot, stiffer moves nothing below 20 Hz
-POINTS = 7
+# Neighbours are a resonance's width apart, at half its power: coarser, and none between them has its amplitude.
+POINTS = 1 + int(np.ceil(np.log(MODES[1] / MODES[0]) / np.log1p(2.0 * DAMPING)))
 NUMERICAL_DAMPING = 0.05  # Newmark's gamma beyond 1/2: takes out modes that the samples can't follow
 
 

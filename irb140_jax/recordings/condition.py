@@ -25,6 +25,8 @@ MIN_TORQUE_BAND = 4.0  # Hz; friction reversals are steps, a narrower band would
 WORKING_RATE = 200.0  # Hz; columns are evaluated at least this often
 SLOW = 3.0  # Hz; below, model and log may differ by the very friction that is looked for
 CREEPING = 1e-3  # of a joint's highest speed in any recording: slower, what holds it may be dry friction that gives way
+OUTLIER = 10.0  # times what a torque usually differs by from its neighbours: a spike of the log ...
+LONE = 3.0  # ... if as many times what those differ by among themselves
 INEXACT = 0.01  # of a servo's torque, by which its law may differ from the torque that it makes
 INCOHERENT = 0.05  # share of the model's torque that may be noise: what biases parameters by as much
 
@@ -195,9 +197,10 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     has_torque = recording.has_torque
     if not has_torque:  # the motion alone: filters would spread the NaN
         recording = dataclasses.replace(recording, tau=np.zeros_like(recording.q))
-    t, q, tau, missing = _even(recording)
+    tau, spikes = (recording.tau, 0) if recording.is_servo_log else _despiked(recording.tau)  # commands may jump
+    # Before samples are moved, which would make two of one.
+    t, q, tau, missing = _even(dataclasses.replace(recording, tau=tau))
     raw_rate = (len(t) - 1) / (t[-1] - t[0])
-    tau, spikes = (tau, 0) if recording.is_servo_log else _despiked(tau)  # commands may jump
     h, h1, h2 = kernels(band.position, raw_rate)
     half = (len(h) - 1) // 2
     unsure = _between(tau, band, raw_rate)
@@ -224,7 +227,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     notes = list(recording.notes)
     if spikes:
         what = "torque spike was" if spikes == 1 else "torque spikes were"
-        notes.append(f"{spikes} {what} replaced by the median of the neighbouring samples")
+        notes.append(f"{spikes} {what} replaced by the mean of the samples beside")
     recorded, began = ~lost[:, None] & ~frozen, float(recording.t[0])
     moving = (recording.source, grid, q, qd, qdd, tau, recorded, recorded & ~resting)
     q_noise = np.sqrt(0.5 * raw_rate * white)
@@ -309,9 +312,17 @@ def _at(grid: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _despiked(tau: np.ndarray) -> tuple[np.ndarray, int]:
-    """Replace isolated outliers by the local median; steps and flat tops stay."""
-    middle = ndimage.median_filter(tau, size=(7, 1), mode="nearest")
+    """Replace single samples that stand out of neighbours that agree by the mean of the two beside them.
+
+    What several samples or several joints show is no error of the log: a gear's blow lasts 10 to 30 ms and shakes the
+    arm.  Rows of nothing but zeros are.
+    """
+    padded = np.pad(tau, ((2, 2), (0, 0)), mode="edge")
+    near = np.stack([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]])
+    middle = 0.5 * (near[1] + near[2])
     off = np.abs(tau - middle)
-    scale = 1.4826 * np.median(off, axis=0) + 1e-3 * np.ptp(tau, axis=0)
-    spike = off > 10.0 * scale
+    # Of a coarse channel most samples equal their neighbours, which makes no spike of its least step.
+    usual = [1.4826 * np.median(x[x > 0.0]) if x.any() else 0.0 for x in off.T]
+    spike = (off > OUTLIER * np.array(usual)) & (off > LONE * np.ptp(near, axis=0))
+    spike &= (spike.sum(axis=1, keepdims=True) == 1) | ~tau.any(axis=1, keepdims=True)
     return np.where(spike, middle, tau), int(spike.sum())
