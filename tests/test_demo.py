@@ -17,9 +17,9 @@ VERDICTS = {"no_mismatch", "parameters_only", "physics_left_out", "unexplained",
 
 
 @pytest.fixture(scope="module")
-def irb140(tmp_path_factory):
-    """The command, with a compilation cache that starts cold and stays for this file."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "IRB140_CACHE": str(tmp_path_factory.mktemp("cache"))}
+def irb140():
+    """The command."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     code = "import sys; from irb140_jax.cli import main; sys.exit(main())"
 
     def run(*words) -> str:

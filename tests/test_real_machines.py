@@ -95,10 +95,7 @@ def test_the_corrected_pendulum_is_at_least_as_good_as_the_published_one(pendulu
         assert ours <= published
 
 
-TILTED = missed("with inertias twice too large, a tilt of gravity")
-
-
-@pytest.mark.parametrize("design", ["C.1", pytest.param("A.0", marks=TILTED)])
+@pytest.mark.parametrize("design", ["C.1", "A.0"])
 def test_doubled_pivot_inertias_are_said_to_be_far_off_on_each_link_and_nothing_is_invented(pendulum, design):
     result = pendulum[f"{design} mistake"]
     for link, right in zip(result["inertials"], pendulum[f"{design} correct"]["inertials"], strict=True):

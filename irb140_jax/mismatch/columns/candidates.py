@@ -5,7 +5,7 @@ data forms the Gram matrix of each stretch of each joint, and from then on no se
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -128,6 +128,19 @@ def library(robot: Robot, effects: Sequence[Effect], scales: Scales, *, scan: bo
                     )
         first += len(sites) * shapes.shape[1] * width
     return Library(robot, tuple(candidates), tuple(blocks), first)
+
+
+def of_kinds(lib: Library, slugs: Collection[str]) -> Library:
+    """The library of some of its effects, in all their shapes; of what is left nothing is compiled anew."""
+    blocks, moved, first = [], {}, 0
+    for effect, sites, shapes, old in lib.blocks:
+        if effect.slug in slugs:
+            blocks.append((effect, sites, shapes, first))
+            moved[effect.slug] = first - old
+            first += len(sites) * shapes.shape[1] * effect.law.width
+    left = (c for c in lib.candidates if c.slug in moved)
+    candidates = tuple(dataclasses.replace(c, columns=c.columns + moved[c.slug]) for c in left)
+    return Library(lib.robot, candidates, tuple(blocks), first)
 
 
 def reshaped(lib: Library, shapes: Sequence[np.ndarray]) -> Library:

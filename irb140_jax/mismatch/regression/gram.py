@@ -8,6 +8,7 @@ effects and y; sums of those over joints are all that a search needs.
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import linalg
@@ -174,6 +175,24 @@ class JointGram:
         else:
             self._kept[key] = self._kept.pop(key)  # most recently used last
         return self._kept[key]
+
+    def left(self, hypers: Sequence[JointHyper], columns: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """Gram matrices of the same shared columns at several hyperparameters, (b, k, k): see `Integrated.left`.
+
+        Args:
+            hypers: Which.
+            columns: Shared columns (k,).
+            scale: Units in which they are wanted, shape (k,).
+        """
+        out, squares = np.empty((len(hypers), len(columns), len(columns))), {}
+        for hyper, left in zip(hypers, out, strict=True):
+            at = self.at(hyper)
+            if hyper[-1] not in squares:  # most of them are at the same level
+                rows = columns + at.first
+                squares[hyper[-1]] = scale[:, None] * at.gram[rows[:, None], rows] * scale / at.level**2
+            half = scale[:, None] * at.half(columns)
+            np.subtract(squares[hyper[-1]], half @ half.T, out=left)
+        return out
 
     def forget(self) -> None:
         """Drop what is kept: hundreds of megabytes, once a search is over."""

@@ -9,7 +9,7 @@ import numpy as np
 from irb140_jax.effects import Effect, Scales
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Loads, Prepared, all_prepared, scales_of, seen_by
-from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, reshaped
+from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, of_kinds, reshaped
 from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, library_of, torques_of
 from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
@@ -26,7 +26,7 @@ from irb140_jax.mismatch.regression.rows import (
 )
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
-from irb140_jax.mismatch.selection.averages import site_of
+from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted, parts
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
@@ -35,8 +35,7 @@ from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
-PASSES = 3  # the noise and the load are those of the model found before; three rounds settle both ...
-MOST_PASSES = 8  # ... unless shapes become finer and finer:
+MOST_ROUNDS = 8  # shapes may become finer and finer
 
 
 def explain(
@@ -64,12 +63,13 @@ def explain(
     scales = scales_of(along)
     first = with_proposals(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     given = _Given(first, scales, band, factor, uncertainty, sensors, progress)
-    start, unsettled = _Start(1, first, along, [None] * len(along)), True
-    while start.round < PASSES or (unsettled and start.round < MOST_PASSES):
-        ex = _explained(given, start)
-        start, unsettled = _next(given, start, ex)
+    start = _Start(1, first, along, [None] * len(along))
+    while True:
+        ex, last = _explained(given, start)
+        if last:
+            return ex
+        start = _next(given, start, ex)
         del ex  # hundreds of megabytes, before the next
-    return _explained(given, start, last=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,11 +98,12 @@ class _Start:
 
     Attributes:
         round: Its number, from 1.
+        whole: Whether it searches the whole library, not only what is named so far.
         lib: The library with shapes as fine as they are so far.
         along: The recordings as effects see them.
         loads: Of the last explanation along each; of the nominal model where None.
         at: Where the regression is linearised; at the nominal model where None.
-        chosen: The set with which the search starts.
+        chosen: The set with which the search starts: candidates of `lib`.
         noise: What the last explanation leaves.
     """
 
@@ -110,14 +111,29 @@ class _Start:
     lib: Library
     along: list[Prepared]
     loads: Sequence[Loads | None]
+    whole: bool = True
     at: Point | None = None
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
 
+    def searched(self) -> tuple[Library, tuple[int, ...]]:
+        """The library that this round searches, and the set with which it starts as candidates of that."""
+        if self.whole:
+            return self.lib, self.chosen
+        every = with_loose_inertials(self.lib)
+        kinds = {every[i].slug for i in self.chosen} | {c.slug for c in every if c.effect.prior.ordinary}
+        lib = of_kinds(self.lib, kinds)
+        return lib, tuple(_same(every[i], every[i].shape, lib) for i in self.chosen)
 
-def _explained(given: _Given, start: _Start, *, last: bool = False) -> Explanation:
-    """One round: columns, sums over all rows, search, and the columns of what was found; of the last, what is named."""
-    lib, at, band, turn = start.lib, start.at, given.band, start.round
+
+def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
+    """One round, and whether it is the last: the whole library was searched, and no effect named that is not settled.
+
+    A round makes columns, sums over all rows, searches, and makes the columns of what was found; the last one of what
+    is named.
+    """
+    at, band, turn = start.at, given.band, start.round
+    lib, chosen = start.searched()
     given.progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
     each = [*zip(start.along, start.loads, strict=True)]
     rows = judged([bare_stretch(lib, r, i, band, given.factor, load, at) for i, (r, load) in enumerate(each)])
@@ -128,31 +144,42 @@ def _explained(given: _Given, start: _Start, *, last: bool = False) -> Explanati
     sums = summed(lib, rows, columns, extra, noise)
     if at and not sums.finite:
         # An explanation without bounds is nothing to start from.
-        return _explained(given, dataclasses.replace(start, at=None), last=last)
+        return _explained(given, dataclasses.replace(start, at=None))
     scale = prior_scale(lib, rows, given.uncertainty, sums.power)
     data = Data(rows, scale, with_loose_inertials(lib), len(given.factor))
     given.progress(f"searching sets of explanations (round {turn})")
     joints = joint_grams(sums, lib, data, extra, noise, given.sensors)
     del sums  # hundreds of megabytes, before the search
-    space = space_of(joints, data, extra[0].common.shape[-1], lib, given.first, settled=turn > 1)
-    # Rounds between the first and the last have finer shapes and another load to settle, seldom another set.
-    best, hyper, sets = selected(space, start.chosen, every_move=turn == 1 or last)
-    if at and not at.rests_on <= {site_of(data.candidates[i]) for i in best}:
+    first = of_kinds(given.first, lib.effects)
+    space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
+    best, hyper, sets = selected(space, chosen, every_move=start.whole)
+    if at and not at.rests_on <= _sites(data, best):
         # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
-        return _explained(given, dataclasses.replace(start, at=None), last=last)
-    best, hyper = named(space, best, hyper, sets) if last else (best, hyper)
-    best, hyper, falls = with_falling_friction(space, data, extra[0], given.scales, best, hyper)
+        return _explained(given, dataclasses.replace(start, at=None))
+    falling = partial(with_falling_friction, space, data, extra[0], given.scales)
+    found, beside, falls = falling(best, hyper)
+    last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
+    if last:
+        found, beside, falls = falling(*named(space, best, hyper, sets))
     for joint in joints:
         joint.forget()
-    members = [data.candidates[i] for i in best]
+    members = [data.candidates[i] for i in found]
     held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
     data = dataclasses.replace(data, stretches=held)
-    ex = Explanation(lib, given.scales, data, extra, noise, space, space, best, hyper, sets, given.factor, falls)
-    return _by_block(ex, given.sensors) if last else ex
+    ex = Explanation(lib, given.scales, data, extra, noise, space, space, found, beside, sets, given.factor, falls)
+    return (_by_block(ex, given.sensors) if last else ex), last
 
 
-def _next(given: _Given, start: _Start, ex: Explanation) -> tuple[_Start, bool]:
-    """What the next round starts from, and whether this one is not settled: too coarse, or off its linearisation."""
+def _sites(data: Data, chosen: Sequence[int]) -> set[Site]:
+    return {site_of(data.candidates[i]) for i in chosen}
+
+
+def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
+    """What the next round starts from.
+
+    What was named is settled before the whole library is searched again: while shapes are coarse, or the explanation is
+    off its linearisation, rounds look at nothing else.
+    """
     robot, found = ex.lib.robot, fitted(ex.data, ex.posterior(), ex.chosen, given.factor)
     physics = _physics(found)
     better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
@@ -161,10 +188,10 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> tuple[_Start, bool]:
     noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
     coarse = _coarse(ex, noise)
     # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
-    lib, chosen = _refined(_without_discrepancy(ex) if start.round == 1 or coarse else ex)
-    at, loads = point(robot, found[0], physics), [t.loads for t in torques]
-    after = _Start(start.round + 1, lib, along, loads, at, chosen, noise)
-    return after, coarse or _off(ex, torques, given.band)
+    lib, chosen = _refined(_without_discrepancy(ex) if start.round == 1 or coarse else ex, start.lib)
+    at, loads, turn = point(robot, found[0], physics), [t.loads for t in torques], start.round + 1
+    whole = turn == MOST_ROUNDS or not (start.whole or coarse or _off(ex, torques, given.band))
+    return _Start(turn, lib, along, loads, whole, at, chosen, noise)
 
 
 def _first_noise(
@@ -213,14 +240,14 @@ def _without_discrepancy(ex: Explanation) -> Explanation:
     return dataclasses.replace(ex, hyper=tuple((*(0 for _ in s[:-1]), s[-1]) for s in ex.hyper))
 
 
-def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
-    """Finer grids of shapes around the best ones, grids that the residual suggests, the set with the best shapes."""
+def _refined(ex: Explanation, whole: Library) -> tuple[Library, tuple[int, ...]]:
+    """The whole library with finer grids around the best shapes, and grids that the residual suggests; and the set."""
     left = left_over(ex.data, ex.columns(), ex.noise.total)
     shapes, best = [], {i: ex.data.candidates[i].shape for i in ex.chosen}
     post = ex.posterior()
     w = post.mean * ex.data.scale[post.columns]
     amplitudes = {i: w[part] for i, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True)}
-    for effect, sites, old, _ in ex.lib.blocks:
+    for effect, sites, old, _ in whole.blocks:
         new = old.copy()
         for s, joints in enumerate(sites):
             mine = [i for i in best if (ex.data.candidates[i].slug, ex.data.candidates[i].joints)
@@ -235,8 +262,8 @@ def _refined(ex: Explanation) -> tuple[Library, tuple[int, ...]]:
             elif effect.shapes.proposal and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
         shapes.append(new)
-    refined = reshaped(ex.lib, shapes)
-    return refined, tuple(_same(ex.data.candidates[i], shape, i, refined) for i, shape in best.items())
+    refined = reshaped(whole, shapes)
+    return refined, tuple(_same(ex.data.candidates[i], shape, refined) for i, shape in best.items())
 
 
 def _coarse(ex: Explanation, left: Noise) -> bool:
@@ -267,10 +294,10 @@ def _grid_of(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array([candidates[i].shape for i in same]), ex.gains(ex.others(index), same)
 
 
-def _same(c: Candidate, shape: np.ndarray, index: int, lib: Library) -> int:
-    """The candidate of a library nearest to a shape of one before; loose inertials keep their place at the end."""
+def _same(c: Candidate, shape: np.ndarray, lib: Library) -> int:
+    """The candidate of a library nearest to a shape of one of another; loose inertials come after all effects."""
     if c.is_inertials:
-        return index
+        return len(lib.candidates) + c.joints[0]
     site = (c.slug, c.joints, c.variant)
     alike = [i for i, o in enumerate(lib.candidates) if (o.slug, o.joints, o.variant) == site]
     return min(alike, key=lambda i: float(np.sum(np.abs(lib.candidates[i].shape - shape))))

@@ -1,5 +1,6 @@
 """Sizes of the discrepancy and noise levels that are best for a set, and the sum over its members' shapes."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,16 +23,16 @@ def settled(
     Returns:
         Log posterior of the set, summed over shapes, -inf where it is inadmissible; and the hyperparameters.
     """
-    joints = range(len(space.joints)) if joints is None else joints
+    joints = list(range(len(space.joints)) if joints is None else joints)
     index = space.with_y(space.set_columns(chosen))
-    moved = True
-    while moved:
-        moved = False
-        prior = space.prior(chosen, hyper)
-        for j in joints:
-            better = _climbed(space, index, hyper, j, prior)
-            moved |= better != hyper and len(joints) > 1
-            hyper = better
+    prior, at_best = space.prior(chosen, hyper), 0
+    for j in itertools.cycle(joints):
+        better = _climbed(space, index, hyper, j, prior)
+        at_best += 1
+        if better != hyper:
+            hyper, prior, at_best = better, space.prior(chosen, better), 1
+        if at_best == len(joints):
+            break
     return space.log_evidence(chosen, hyper) + over_shapes(space, chosen, hyper), hyper
 
 
@@ -67,7 +68,7 @@ def _climbed(space: Space, index: np.ndarray, hyper: Hyper, j: int, prior: np.nd
 
     def values(tries: list[JointHyper]) -> None:
         if new := [s for s in tries if s not in known]:
-            own = np.stack([scale[:, None] * gram.at(s).left(take, take) * scale for s in new])
+            own = gram.left(new, take, scale)
             diagonal = cholesky_diagonals(rest + own)
             value = 0.5 * (own[:, -1, -1] - diagonal[:, -1] ** 2) - np.log(diagonal[:, :-1]).sum(axis=1)
             known.update(zip(new, value + [gram.at(s).constant for s in new], strict=True))
