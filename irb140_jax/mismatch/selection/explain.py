@@ -105,6 +105,7 @@ class _Start:
         at: Where the regression is linearised; at the nominal model where None.
         chosen: The set with which the search starts: candidates of `lib`.
         noise: What the last explanation leaves.
+        seen: Effects that any round so far has named.
     """
 
     round: int
@@ -115,6 +116,7 @@ class _Start:
     at: Point | None = None
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
+    seen: frozenset[Site] = frozenset()
 
     def searched(self) -> tuple[Library, tuple[int, ...]]:
         """The library that this round searches, and the set with which it starts as candidates of that."""
@@ -127,7 +129,7 @@ class _Start:
 
 
 def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
-    """One round, and whether it is the last: the whole library was searched, and no effect named that is not settled.
+    """One round, and whether it is the last: the whole library was searched, and named is only what rounds before saw.
 
     A round makes columns, sums over all rows, searches, and makes the columns of what was found; the last one of what
     is named.
@@ -158,7 +160,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         return _explained(given, dataclasses.replace(start, at=None))
     falling = partial(with_falling_friction, space, data, extra[0], given.scales)
     found, beside, falls = falling(best, hyper)
-    last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
+    last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= start.seen)
     if last:
         found, beside, falls = falling(*named(space, best, hyper, sets))
     for joint in joints:
@@ -191,7 +193,8 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     lib, chosen = _refined(_without_discrepancy(ex) if start.round == 1 or coarse else ex, start.lib)
     at, loads, turn = point(robot, found[0], physics), [t.loads for t in torques], start.round + 1
     whole = turn == MOST_ROUNDS or not (start.whole or coarse or _off(ex, torques, given.band))
-    return _Start(turn, lib, along, loads, whole, at, chosen, noise)
+    seen = start.seen | _sites(ex.data, ex.chosen)
+    return _Start(turn, lib, along, loads, whole, at, chosen, noise, seen)
 
 
 def _first_noise(
