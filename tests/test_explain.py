@@ -102,6 +102,26 @@ def test_what_the_last_search_adds_is_settled_too(monkeypatch):
     assert np.all(off(ex) < 0.01)
 
 
+def test_what_is_dropped_twice_as_soon_as_it_is_refined_is_not_searched_again(monkeypatch):
+    """Without a limit it would be named by every search of everything, and dropped by every round after it."""
+    real, named = loop.selected, []
+
+    def drops_it(space, chosen=(), *, every_move=True):
+        best, hyper, sets = real(space, chosen, every_move=every_move)
+        stretch = {i for i in best if space.candidates[i].slug == "position_dependent_friction"}
+        if every_move:
+            named.append(bool(stretch))
+            return best, hyper, sets
+        usual = tuple(i for i, c in enumerate(space.candidates) if c.effect.prior.ordinary)
+        value, hyper = settled(space, usual, (START,) * len(space.joints))
+        return usual, hyper, {frozenset(usual): value}
+
+    monkeypatch.setattr(loop, "selected", drops_it)
+    ex, _ = explained.__wrapped__(6.0)
+    assert named == [True, True, False]
+    assert {m.slug for m in ex.members} <= {"coulomb_friction"}
+
+
 def grid_of_stretches() -> np.ndarray:
     one = np.ones(1)
     return FRICTION[1].shapes.grid(Scales(one, one, one, -one, one, 10.0, one, one), np.array([0]))

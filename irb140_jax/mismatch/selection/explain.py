@@ -36,6 +36,7 @@ from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
 MOST_ROUNDS = 8  # shapes may become finer and finer
+OFTEN = 2  # times that an effect is dropped as soon as its shape is refined, after which it is not searched again
 
 
 def explain(
@@ -105,7 +106,7 @@ class _Start:
         at: Where the regression is linearised; at the nominal model where None.
         chosen: The set with which the search starts: candidates of `lib`.
         noise: What the last explanation leaves.
-        seen: Effects that any round so far has named.
+        dropped: Effects that did not outlast their refinement, each as often as that happened.
     """
 
     round: int
@@ -116,7 +117,7 @@ class _Start:
     at: Point | None = None
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
-    seen: frozenset[Site] = frozenset()
+    dropped: tuple[Site, ...] = ()
 
     def searched(self) -> tuple[Library, tuple[int, ...]]:
         """The library that this round searches, and the set with which it starts as candidates of that."""
@@ -129,7 +130,7 @@ class _Start:
 
 
 def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
-    """One round, and whether it is the last: the whole library was searched, and named is only what rounds before saw.
+    """One round, and whether it is the last: the whole library was searched, and named is only what is settled.
 
     A round makes columns, sums over all rows, searches, and makes the columns of what was found; the last one of what
     is named.
@@ -154,13 +155,15 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     del sums  # hundreds of megabytes, before the search
     first = of_kinds(given.first, lib.effects)
     space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
-    best, hyper, sets = selected(space, chosen, every_move=start.whole)
+    barred = [start.dropped.count(site_of(c)) >= OFTEN for c in data.candidates]
+    open_ = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
+    best, hyper, sets = selected(open_, chosen, every_move=start.whole)
     if at and not at.rests_on <= _sites(data, best):
         # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
         return _explained(given, dataclasses.replace(start, at=None))
     falling = partial(with_falling_friction, space, data, extra[0], given.scales)
     found, beside, falls = falling(best, hyper)
-    last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= start.seen)
+    last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
     if last:
         found, beside, falls = falling(*named(space, best, hyper, sets))
     for joint in joints:
@@ -193,8 +196,9 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     lib, chosen = _refined(_without_discrepancy(ex) if start.round == 1 or coarse else ex, start.lib)
     at, loads, turn = point(robot, found[0], physics), [t.loads for t in torques], start.round + 1
     whole = turn == MOST_ROUNDS or not (start.whole or coarse or _off(ex, torques, given.band))
-    seen = start.seen | _sites(ex.data, ex.chosen)
-    return _Start(turn, lib, along, loads, whole, at, chosen, noise, seen)
+    before = with_loose_inertials(start.lib)
+    lost = () if start.whole else {site_of(before[i]) for i in start.chosen} - _sites(ex.data, ex.chosen)
+    return _Start(turn, lib, along, loads, whole, at, chosen, noise, (*start.dropped, *lost))
 
 
 def _first_noise(
