@@ -197,6 +197,9 @@ def pendulum(result: dict) -> list[str]:
     """What was named of the pendulum's servo without its duty cycle."""
     fit = result["fit"]["servo"]
     others = {a["effect"] for f in result["findings"] for a in f["alternatives"]}
+    gain = [
+        "The gain is none that the stored diagnosis with the duty cycle names: commands alone say less here."
+    ] if any(f["effect"] == "torque_gain" for f in result["findings"]) else []  # fmt: skip
     return [
         "## The same servo from commands and positions alone (`bam_xl330`)", "",
         "The duty cycle that was logged is withheld; torque is that of the published position loop, rows at its limit",
@@ -204,8 +207,7 @@ def pendulum(result: dict) -> list[str]:
         f"Named: {named(result['findings']) or 'nothing'}.",
         f"Alternatives: {', '.join(sorted(others)) or 'none'}. On unseen data the error goes from",
         f"{fit['rmse_nominal']:.3g} N m (model as given) over {fit['rmse_refit']:.3g} (inertials refitted) to",
-        f"{fit['rmse_corrected']:.3g}. Its position error was not simulated from this diagnosis. The gain is none that",
-        "the stored diagnosis with the duty cycle names: commands alone say less here.", "",
+        f"{fit['rmse_corrected']:.3g}. Its position error was not simulated from this diagnosis.", *gain, "",
     ]  # fmt: skip
 
 
