@@ -28,7 +28,7 @@ from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
 from irb140_jax.mismatch.regression.sufficient_data import Comparison, comparison, too_little
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
-from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, beyond_columns, held_out, refitted
+from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted
 from irb140_jax.mismatch.validation.testable import reference, visibility
 from irb140_jax.mismatch.validation.unexplained import unexplained
 from irb140_jax.recordings.recording import Recording
@@ -157,7 +157,7 @@ def _corrected(
     )  # fmt: skip
     by_laws = [torques_along(laws, r).corrected for r in data.smooth]
     # The errors that are told are those of the model that predicts, not of its linearisation.
-    proof = proof.as_predicted(beyond_columns(ex, post, scale, by_laws, data.band))
+    proof = proof.as_predicted(ex.beyond_columns(post, scale, by_laws, data.band))
     discrepancy, harmful = discrepancy_carried(ex, own, proof.carried), np.zeros(data.robot.n, dtype=bool)
     if data.servo is not None and discrepancy is not None:
         without = [data.band.apply(torque) for torque in by_laws]

@@ -131,7 +131,10 @@ def library(robot: Robot, effects: Sequence[Effect], scales: Scales, *, scan: bo
 
 
 def of_kinds(lib: Library, slugs: Collection[str]) -> Library:
-    """The library of some of its effects, in all their shapes; of what is left nothing is compiled anew."""
+    """The library of some of its effects, in all their shapes.
+
+    Each effect is a program of its own, so nothing is compiled anew.
+    """
     blocks, moved, first = [], {}, 0
     for effect, sites, shapes, old in lib.blocks:
         if effect.slug in slugs:

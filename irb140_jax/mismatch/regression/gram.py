@@ -180,18 +180,18 @@ class JointGram:
         """Gram matrices of the same shared columns at several hyperparameters, (b, k, k): see `Integrated.left`.
 
         Args:
-            hypers: Which.
-            columns: Shared columns (k,).
+            hypers: Sizes and levels, b of them.
+            columns: Shared columns, shape (k,).
             scale: Units in which they are wanted, shape (k,).
         """
         out, squares = np.empty((len(hypers), len(columns), len(columns))), {}
-        for hyper, left in zip(hypers, out, strict=True):
+        for hyper, G in zip(hypers, out, strict=True):
             at = self.at(hyper)
             if hyper[-1] not in squares:  # most of them are at the same level
                 rows = columns + at.first
                 squares[hyper[-1]] = scale[:, None] * at.gram[rows[:, None], rows] * scale / at.level**2
             half = scale[:, None] * at.half(columns)
-            np.subtract(squares[hyper[-1]], half @ half.T, out=left)
+            np.subtract(squares[hyper[-1]], half @ half.T, out=G)
         return out
 
     def forget(self) -> None:

@@ -106,7 +106,7 @@ class _Start:
         at: Where the regression is linearised; at the nominal model where None.
         chosen: The set with which the search starts: candidates of `lib`.
         noise: What the last explanation leaves.
-        dropped: Effects that did not outlast their refinement, each as often as that happened.
+        dropped: Effects that were named and then dropped when their shape was refined, each as often as that happened.
     """
 
     round: int
@@ -156,22 +156,24 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     first = of_kinds(given.first, lib.effects)
     space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
     barred = [start.dropped.count(site_of(c)) >= OFTEN for c in data.candidates]
-    open_ = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
-    best, hyper, sets = selected(open_, chosen, every_move=start.whole)
+    without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
+    best, hyper, sets = selected(without_barred, chosen, every_move=start.whole)
     if at and not at.rests_on <= _sites(data, best):
         # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
         return _explained(given, dataclasses.replace(start, at=None))
     falling = partial(with_falling_friction, space, data, extra[0], given.scales)
-    found, beside, falls = falling(best, hyper)
+    found, found_hyper, falls = falling(best, hyper)
     last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
     if last:
-        found, beside, falls = falling(*named(space, best, hyper, sets))
+        found, found_hyper, falls = falling(*named(space, best, hyper, sets))
     for joint in joints:
         joint.forget()
     members = [data.candidates[i] for i in found]
     held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
     data = dataclasses.replace(data, stretches=held)
-    ex = Explanation(lib, given.scales, data, extra, noise, space, space, found, beside, sets, given.factor, falls)
+    ex = Explanation(
+        lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls
+    )
     return (_by_block(ex, given.sensors) if last else ex), last
 
 
@@ -196,8 +198,9 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     lib, chosen = _refined(_without_discrepancy(ex) if start.round == 1 or coarse else ex, start.lib)
     at, loads, turn = point(robot, found[0], physics), [t.loads for t in torques], start.round + 1
     whole = turn == MOST_ROUNDS or not (start.whole or coarse or _off(ex, torques, given.band))
-    before = with_loose_inertials(start.lib)
-    lost = () if start.whole else {site_of(before[i]) for i in start.chosen} - _sites(ex.data, ex.chosen)
+    every = with_loose_inertials(start.lib)
+    refined = {site_of(every[i]) for i in start.chosen if not start.whole and every[i].effect.shapes.finer}
+    lost = refined - _sites(ex.data, ex.chosen)
     return _Start(turn, lib, along, loads, whole, at, chosen, noise, (*start.dropped, *lost))
 
 
@@ -232,14 +235,10 @@ def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
         torques: What its numbers give along the recordings, products of unknowns included.
         band: Of the comparison.
     """
-    post = ex.posterior()
-    w = post.mean * ex.data.scale[post.columns]
-    square = np.zeros(len(ex.hyper))
-    for s, t in zip(ex.data.stretches, torques, strict=True):
-        linear = s.tau - s.y + s.torque(post.columns, w)
-        square += np.sum(np.where(s.use, band.apply(t.corrected) - linear, 0.0) ** 2, axis=0)
-    rows = np.maximum(sum(s.use.sum(axis=0) for s in ex.data.stretches), 1)
-    return bool(np.any(np.sqrt(square / rows) > ex.level))
+    use = np.concatenate([s.use for s in ex.data.stretches])
+    beyond = np.concatenate(ex.beyond_columns(ex.posterior(), 0.0, [t.corrected for t in torques], band))
+    square = np.sum(np.where(use, beyond, 0.0) ** 2, axis=0) / np.maximum(use.sum(axis=0), 1)
+    return bool(np.any(np.sqrt(square) > ex.level))
 
 
 def _without_discrepancy(ex: Explanation) -> Explanation:

@@ -20,6 +20,7 @@ from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.falling_friction import Fall
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.screening import gains, near, reshaped
+from irb140_jax.recordings.low_pass import Band
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,6 +119,25 @@ class Explanation:
         mean, cov = space.posterior(chosen, self.hyper, instrument=instrument, scaled=self.scaled)
         keep = np.r_[0 : self.space.inertials, self.space.offset : len(mean)]
         return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
+
+    def beyond_columns(
+        self, post: Posterior, scale: float, torques: Sequence[np.ndarray], band: Band
+    ) -> list[np.ndarray]:
+        """What the torque of laws is beyond the sum of their columns [N m or N], (R, n) each: products of unknowns.
+
+        Nothing where the round was linearised at what it found.
+
+        Args:
+            post: Inertials and amplitudes.
+            scale: Logged over real torque of all joints alike, less one.
+            torques: Of the laws with those numbers along each recording, (T, n) [N m or N].
+            band: Of the comparison.
+        """
+        w, out = post.mean * self.data.scale[post.columns], []
+        for s, extra, torque in zip(self.data.stretches, self.extra, torques, strict=True):
+            linear = s.tau - s.y + s.torque(post.columns, w) + scale / settings.GAIN_COMMON * extra.common[..., 0]
+            out.append(band.apply(torque) - linear)
+        return out
 
     def torque_scale(self) -> tuple[float, float]:
         """Logged over real torque of all joints alike, less one: mean and standard deviation."""

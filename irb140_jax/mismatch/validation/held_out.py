@@ -10,7 +10,6 @@ from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
-from irb140_jax.recordings.low_pass import Band
 
 SETTLED = 2  # rounds in which the noise and what leaves it agree
 
@@ -64,7 +63,10 @@ class HeldOut:
         return np.any([u.any(axis=0) for u in self.use], axis=0)
 
     def as_predicted(self, beyond: list[np.ndarray]) -> "HeldOut":
-        """The same of a model whose torque is this much, (R, n) each, beyond what the columns of its laws add up to."""
+        """The same of a model whose torque is this much, (R, n) each, beyond what the columns of its laws add up to.
+
+        That is known of the fit to all data; the fits that leave some out are taken to have as much.
+        """
         named, corrected = ([x - b for x, b in zip(of, beyond, strict=True)] for of in (self.named, self.corrected))
         return dataclasses.replace(self, named=named, corrected=corrected)
 
@@ -213,27 +215,6 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
     return HeldOut(
         nominal, out["refit"], out["named"], left, carried, recorded, use, gains["flexible"] > 0.0, tuple(fits)
     )
-
-
-def beyond_columns(
-    ex: Explanation, post: Posterior, scale: float, torques: list[np.ndarray], band: Band
-) -> list[np.ndarray]:
-    """What the torque of a model's laws is beyond the sum of their columns: products of what was found, (R, n) each.
-
-    Hardly anything where the last round was linearised at what it found.
-
-    Args:
-        ex: The explanation.
-        post: Its inertials and amplitudes.
-        scale: Its torque scale less one.
-        torques: Of the laws with those numbers, along each recording, (T, n).
-        band: Of the comparison.
-    """
-    w, out = post.mean * ex.data.scale[post.columns], []
-    for s, extra, torque in zip(ex.data.stretches, ex.extra, torques, strict=True):
-        linear = s.tau - s.y + s.torque(post.columns, w) + scale / settings.GAIN_COMMON * extra.common[..., 0]
-        out.append(band.apply(torque) - linear)
-    return out
 
 
 def _of_own(extra: Nuisances, w: list[np.ndarray]) -> np.ndarray:
