@@ -120,6 +120,28 @@ def test_a_shape_that_is_dropped_twice_when_refined_is_not_searched_again_but_or
     assert {m.slug for m in ex.members} == {"coulomb_friction"}
 
 
+def test_a_delay_that_was_found_may_be_any_in_the_next_round(monkeypatch):
+    """Its shape follows from it; bound to within a step of its shape, one that moves further would be dropped."""
+    real, bounds = loop.space_of, []
+
+    def seen(joints, data, *args, **kwargs):
+        space = real(joints, data, *args, **kwargs)
+        mine = [i for i, c in enumerate(data.candidates) if c.slug == "time_delay"]
+        bounds.append(np.isfinite([space.lowest[mine, 0], space.highest[mine, 0]]).all(axis=0))
+        return space
+
+    monkeypatch.setattr(loop, "space_of", seen)
+    logs, arm = [rubbing(seed, 0.0, WIDTH) for seed in (4, 5)], robot()
+    late = [dataclasses.replace(r, tau=np.roll(r.tau, -5, axis=0)) for r in logs]
+    band = choose_band(late, arm)
+    effects = (CATALOGUE["coulomb_friction"], CATALOGUE["time_delay"])
+    ex = explain(arm, conditioned(late, band), band, effects, 0.05, np.full(3, 0.002))
+    step = float(np.median(np.diff(late[0].t)))
+    (index,) = [i for i, m in zip(ex.chosen, ex.members, strict=True) if m.slug == "time_delay"]
+    assert ex.data.candidates[index].shape[0] == pytest.approx(2.5 * step, rel=0.05)
+    assert bounds[0].all() and not np.any(bounds[1:])
+
+
 def grid_of_stretches() -> np.ndarray:
     one = np.ones(1)
     return FRICTION[1].shapes.grid(Scales(one, one, one, -one, one, 10.0, one, one), np.array([0]))

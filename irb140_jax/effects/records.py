@@ -141,7 +141,8 @@ class Prior:
         lowest: Smallest admissible amplitude of each column, a number or a value that the model has of the site's
             joint; none where there are no bounds.
         highest: Largest admissible amplitude of each column; beyond it another cause is to be looked for.
-        at_shape: From a shape (s,) to the smallest and the largest amplitude (k,) with which that shape means anything.
+        at_shape: From a shape (s,) to the smallest and the largest amplitude (k,) with which that shape means anything;
+            others belong to other shapes of the grid.
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
         tied: Its amplitudes are of one order of size: what the data can't see of one, the others bound.
         vector: Its amplitudes are components of one vector: what the data can't see of it may be larger than the rest.

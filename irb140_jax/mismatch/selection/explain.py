@@ -27,7 +27,7 @@ from irb140_jax.mismatch.regression.rows import (
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
 from irb140_jax.mismatch.selection.averages import Site, site_of
-from irb140_jax.mismatch.selection.explanation import Explanation, fitted, parts
+from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
@@ -195,7 +195,8 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
     coarse = _coarse(ex, noise)
     # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
-    lib, chosen = _refined(_without_discrepancy(ex) if start.round == 1 or coarse else ex, start.lib)
+    exact = _without_discrepancy(ex) if start.round == 1 or coarse else ex
+    lib, chosen = _refined(exact, start.lib, {(p.effect.slug, p.joints): p.shape for p in physics})
     at, loads, turn = point(robot, found[0], physics), [t.loads for t in torques], start.round + 1
     whole = turn == MOST_ROUNDS or not (start.whole or coarse or _off(ex, torques, given.band))
     every = with_loose_inertials(start.lib)
@@ -246,13 +247,18 @@ def _without_discrepancy(ex: Explanation) -> Explanation:
     return dataclasses.replace(ex, hyper=tuple((*(0 for _ in s[:-1]), s[-1]) for s in ex.hyper))
 
 
-def _refined(ex: Explanation, whole: Library) -> tuple[Library, tuple[int, ...]]:
-    """The whole library with finer grids around the best shapes, and grids that the residual suggests; and the set."""
+def _refined(
+    ex: Explanation, whole: Library, shaped: dict[tuple[str, tuple[int, ...]], np.ndarray]
+) -> tuple[Library, tuple[int, ...]]:
+    """The whole library with finer grids around the best shapes, and grids that the residual suggests; and the set.
+
+    Args:
+        ex: The explanation.
+        whole: The library.
+        shaped: Shapes of what was found, for those that follow from amplitudes.
+    """
     left = left_over(ex.data, ex.columns(), ex.noise.total)
     shapes, best = [], {i: ex.data.candidates[i].shape for i in ex.chosen}
-    post = ex.posterior()
-    w = post.mean * ex.data.scale[post.columns]
-    amplitudes = {i: w[part] for i, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True)}
     for effect, sites, old, _ in whole.blocks:
         new = old.copy()
         for s, joints in enumerate(sites):
@@ -260,10 +266,8 @@ def _refined(ex: Explanation, whole: Library) -> tuple[Library, tuple[int, ...]]
                     == (effect.slug, tuple(joints))]  # fmt: skip
             if mine and effect.shapes.finer:
                 best[mine[0]], peak = _peak(ex, mine[0])
-                if effect.shapes.follows and effect.prior.at_shape:
-                    # With laws that are taken for exact, amplitudes may be beyond those that the shape allows.
-                    allowed = np.clip(amplitudes[mine[0]], *effect.prior.at_shape(ex.data.candidates[mine[0]].shape))
-                    peak = effect.shapes.follows(allowed, peak)
+                if effect.shapes.follows:
+                    peak = shaped[effect.slug, ex.data.candidates[mine[0]].joints]
                 new[s] = effect.shapes.finer(old[s], peak)
             elif effect.shapes.proposal and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])
@@ -275,11 +279,13 @@ def _refined(ex: Explanation, whole: Library) -> tuple[Library, tuple[int, ...]]
 def _coarse(ex: Explanation, left: Noise) -> bool:
     """Whether finer shapes may still leave less at some joint: the noise left there is not yet what it was thought.
 
+    Shapes that follow from amplitudes have no finer grid.
+
     Args:
         ex: The explanation.
         left: Noise that it leaves.
     """
-    shaped = [j for m in ex.members if m.effect.shapes.finer for j in m.joints]
+    shaped = [j for m in ex.members if m.effect.shapes.finer and not m.effect.shapes.follows for j in m.joints]
     was, now = (np.sqrt(np.mean(noise.total**2, axis=0)) for noise in (ex.noise, left))
     return bool(np.any(np.abs(np.log(now / was))[shaped] > settings.SETTLED_NOISE))
 

@@ -29,6 +29,9 @@ def space_of(
     lowest, highest = np.full((2, len(candidates), width), -np.inf)
     highest[:] = np.inf
     weights, least = np.zeros((len(candidates), width)), np.full(len(candidates), -np.inf)
+    shapes: dict[tuple[str, tuple[int, ...]], set[tuple[float, ...]]] = {}
+    for c in candidates:
+        shapes.setdefault((c.slug, c.joints), set()).add(tuple(c.shape))
     for i, c in enumerate(candidates):
         s, k = data.scale[data.nuisances + c.columns], len(c.columns)
         unit = np.where(s > 0.0, s, 1.0)
@@ -37,7 +40,8 @@ def space_of(
         low, high = c.lowest, c.highest
         if settled:
             low = np.where(np.isin(c.variant, c.effect.law.own), np.maximum(low, c.effect.shapes.settled), low)
-        if c.effect.prior.at_shape and (s > 0.0).all():
+        # What no other shape is there for is for the next round, whose shape follows from it.
+        if c.effect.prior.at_shape and (s > 0.0).all() and len(shapes[c.slug, c.joints]) > 1:
             at_least, at_most = c.effect.prior.at_shape(c.shape)
             low = np.maximum(low, at_least[list(c.variant)])
             high = np.minimum(high, at_most[list(c.variant)])
