@@ -248,14 +248,14 @@ def _without_discrepancy(ex: Explanation) -> Explanation:
 
 
 def _refined(
-    ex: Explanation, whole: Library, shaped: dict[tuple[str, tuple[int, ...]], np.ndarray]
+    ex: Explanation, whole: Library, found: dict[Site, np.ndarray]
 ) -> tuple[Library, tuple[int, ...]]:
     """The whole library with finer grids around the best shapes, and grids that the residual suggests; and the set.
 
     Args:
         ex: The explanation.
         whole: The library.
-        shaped: Shapes of what was found, for those that follow from amplitudes.
+        found: Shapes of what was found, taken where they follow from amplitudes.
     """
     left = left_over(ex.data, ex.columns(), ex.noise.total)
     shapes, best = [], {i: ex.data.candidates[i].shape for i in ex.chosen}
@@ -267,7 +267,7 @@ def _refined(
             if mine and effect.shapes.finer:
                 best[mine[0]], peak = _peak(ex, mine[0])
                 if effect.shapes.follows:
-                    peak = shaped[effect.slug, ex.data.candidates[mine[0]].joints]
+                    peak = found[site_of(ex.data.candidates[mine[0]])]
                 new[s] = effect.shapes.finer(old[s], peak)
             elif effect.shapes.proposal and not mine:
                 new[s] = suggested(effect, left, ex.scales, joints, old[s])

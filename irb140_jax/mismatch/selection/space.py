@@ -1,5 +1,6 @@
 """The space that a search visits: priors and bounds of every candidate, beside the Gram matrices."""
 
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -7,6 +8,7 @@ from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
 from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gram import JointGram
+from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.evidence import Space
 from irb140_jax.mismatch.selection.kinds import kinds_of
 
@@ -29,9 +31,7 @@ def space_of(
     lowest, highest = np.full((2, len(candidates), width), -np.inf)
     highest[:] = np.inf
     weights, least = np.zeros((len(candidates), width)), np.full(len(candidates), -np.inf)
-    shapes: dict[tuple[str, tuple[int, ...]], set[tuple[float, ...]]] = {}
-    for c in candidates:
-        shapes.setdefault((c.slug, c.joints), set()).add(tuple(c.shape))
+    by_site = _by_site(candidates)
     for i, c in enumerate(candidates):
         s, k = data.scale[data.nuisances + c.columns], len(c.columns)
         unit = np.where(s > 0.0, s, 1.0)
@@ -40,8 +40,8 @@ def space_of(
         low, high = c.lowest, c.highest
         if settled:
             low = np.where(np.isin(c.variant, c.effect.law.own), np.maximum(low, c.effect.shapes.settled), low)
-        # What no other shape is there for is for the next round, whose shape follows from it.
-        if c.effect.prior.at_shape and (s > 0.0).all() and len(shapes[c.slug, c.joints]) > 1:
+        # Beyond these bounds an amplitude belongs to another shape of the grid; one shape alone follows the amplitude.
+        if c.effect.prior.at_shape and (s > 0.0).all() and _differ(by_site[site_of(c)]):
             at_least, at_most = c.effect.prior.at_shape(c.shape)
             low = np.maximum(low, at_least[list(c.variant)])
             high = np.minimum(high, at_most[list(c.variant)])
@@ -56,9 +56,7 @@ def space_of(
 
 def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
     """Log prior odds of every candidate, shape (candidates,): of its shape, and of ordinary friction at a joint."""
-    kinds: dict[tuple[str, tuple[int, ...]], list[Candidate]] = {}
-    for c in data.candidates:
-        kinds.setdefault((c.slug, c.joints), []).append(c)
+    by_site = _by_site(data.candidates)
     narrowed = {
         (new[0].slug, tuple(map(int, joints))): _narrowed(new[2][s], old[2][s])
         for new, old in zip(lib.blocks, first.blocks, strict=True)
@@ -66,17 +64,29 @@ def log_prior(data: Data, lib: Library, first: Library) -> np.ndarray:
     }
 
     def rare(c: Candidate) -> float:
-        alike, prior = kinds[c.slug, c.joints], -np.log(c.effect.shapes.scanned)
+        alike, prior = by_site[site_of(c)], -np.log(c.effect.shapes.scanned)
         if c.effect.shapes.follows and (at_shape := c.effect.prior.at_shape):
             # No parameter of its own: those that some amplitude may have share its prior, half either side of zero.
             tried = np.unique([o.shape for o in alike], axis=0)
             least, most = np.array([at_shape(shape) for shape in tried])[:, :, 0].T
             middle = np.mean(at_shape(c.shape))
             return float(prior - np.log(2.0 * np.sum((least <= middle) & (middle < most))))
-        return float(prior - np.log(len(alike))) + narrowed.get((c.slug, c.joints), 0.0)
+        return float(prior - np.log(len(alike))) + narrowed.get(site_of(c), 0.0)
 
     usual = np.log(settings.COMMON / (1.0 - settings.COMMON))
     return np.array([usual if c.effect.prior.ordinary else rare(c) for c in data.candidates])
+
+
+def _by_site(candidates: Sequence[Candidate]) -> dict[Site, list[Candidate]]:
+    out: dict[Site, list[Candidate]] = {}
+    for c in candidates:
+        out.setdefault(site_of(c), []).append(c)
+    return out
+
+
+def _differ(candidates: Sequence[Candidate]) -> bool:
+    """Whether candidates have more than one shape."""
+    return any(not np.array_equal(c.shape, candidates[0].shape) for c in candidates)
 
 
 def _narrowed(grid: np.ndarray, first: np.ndarray) -> float:
