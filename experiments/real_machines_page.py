@@ -164,12 +164,13 @@ def _listed(words: list[str]) -> str:
 
 def legs_judged(result: dict) -> list[str]:
     """Which of the expectations that came with the legs' data are met."""
-    rotors, viscous, rubbing = [], [], 0
+    rotors, viscous, delays, rubbing = [], [], [], 0
     for found in result["splits"].values():
         for one in found["legs"].values():
             for f in one["findings"]:
                 if f["effect"] == "rotor_inertia" and f["joints"][0].endswith("calf_joint"):
                     rotors.append(f["parameters"]["inertia"])
+                delays += [1e3 * f["parameters"]["delay"]["value"]] if f["effect"] == "time_delay" else []
                 viscous += [p["value"] for name, p in f["parameters"].items() if name == "viscous"]
             rubbing += any("friction" in f["effect"] or "hysteresis" in f["effect"] for f in one["findings"]
                            if f["joints"][-1].endswith("calf_joint"))  # fmt: skip
@@ -186,7 +187,9 @@ def legs_judged(result: dict) -> list[str]:
         f"A rotor on the calf is named in {len(rotors)} of {count} diagnoses, {within} of them with an interval (two",
         "standard deviations) that meets 0.031 to 0.039 kg m². Dry friction or a law that holds it is named on the",
         f"calf in {rubbing} of {count}. The smallest viscous coefficient is {min(viscous, default=0.0):.3g} N m s/rad.",
-        "Where a delay sits is left open, as the notes of each diagnosis say.", "",
+        "Where a delay sits is left open, as the notes of each diagnosis say.",
+        *([f"Delays of {min(delays):.0f} to {max(delays):.0f} ms are named in {len(delays)} of {count}.",
+           "That is too long: with the baseline's laws, the error is least at 5 to 20 ms."] if delays else []), "",
         f"Held-out errors are at most the baseline's on {_listed(met) or 'none'};",
         f"larger on {_listed(missed) or 'none'}. The corrected model errs more than the model as given on",
         f"{_listed(worse) or 'none'}.",
