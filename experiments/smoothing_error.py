@@ -19,8 +19,9 @@ from trials import Kind, case_of
 from irb140_jax import dynamics
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.recordings import smooth
+from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.conceal import ConcealedCase
-from irb140_jax.recordings.condition import choose_band, conditioned
+from irb140_jax.recordings.condition import conditioned
 from irb140_jax.recordings.low_pass import filtered, kernels
 from irb140_jax.robot import Robot
 

@@ -28,16 +28,41 @@ def two_links(kp=KP, kd=KD, shoulder="", elbow="", limit=None, actuators=None, g
 
 def closed_loop(xml, seed=1, duration=16.0, delay=0.0, noise=NOISE):
     """A recording of commands and positions, and the torque that MuJoCo's actuators gave, (T, 2) [N m]."""
-    model = mujoco.MjModel.from_xml_string(xml)
-    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     t = np.arange(round(duration / STEP)) * STEP
     waves = [(rng.uniform(0.1, 0.35), rng.uniform(0.15, 1.6), rng.uniform(0.0, 6.0)) for _ in range(10)]
     wave = lambda k: sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in waves[5 * k : 5 * k + 5])  # noqa: E731
     command = np.stack([wave(0), wave(1)], axis=1)
-    late = round(delay / STEP)
-    data.qpos[:], q, torque = command[0], np.empty_like(command), np.empty_like(command)
+    return _logged(xml, t, command, rng, seed, noise, late=round(delay / STEP))
+
+
+def to_and_fro(xml, pushed, seed=1, noise=2e-5):
+    """The same, faster and faster to and fro between two postures, while torques that nobody knows push the joints.
+
+    Args:
+        xml: The plant.
+        pushed: Standard deviation of those torques, of any frequency below 60 Hz [N m].
+        seed: Of all that is random.
+        noise: Of the encoders [rad].
+    """
+    rng, sweeps = np.random.default_rng(seed), np.arange(3.0, 0.5, -0.2)
+    t = np.arange(round(sweeps.sum() / STEP)) * STEP
+    ends = np.cumsum(sweeps)
+    k = np.searchsorted(ends, t, side="right")
+    there = 1.0 - np.abs(2.0 * (t - ends[k] + sweeps[k]) / sweeps[k] - 1.0)
+    held = round(0.008 / STEP)
+    push = pushed * np.repeat(rng.normal(size=(len(t) // held + 1, 2)), held, axis=0)[: len(t)]
+    command = np.stack([0.6 * there, 1.2 * there - 0.6], axis=1)
+    return _logged(xml, t, command, rng, seed, noise, push=push)
+
+
+def _logged(xml, t, command, rng, seed, noise, late=0, push=None):
+    model = mujoco.MjModel.from_xml_string(xml)
+    data, q, torque = mujoco.MjData(model), np.empty_like(command), np.empty_like(command)
+    data.qpos[:] = command[0]
     for i in range(len(t)):
         q[i], data.ctrl[:] = data.qpos, command[max(i - late, 0)]
+        data.qfrc_applied[:] = 0.0 if push is None else push[i]
         mujoco.mj_step(model, data)
         torque[i] = data.qfrc_actuator
     rows = slice(round(0.5 / STEP), None, round(1.0 / RATE / STEP))

@@ -14,7 +14,8 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch.columns.torques import Named
 from irb140_jax.mismatch.corrected.model import CorrectedModel, predict
-from irb140_jax.recordings.condition import choose_band, condition, conditioned
+from irb140_jax.recordings.band import choose_band
+from irb140_jax.recordings.condition import condition, conditioned
 from irb140_jax.recordings.direction import direction_of
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording

@@ -15,7 +15,8 @@ from irb140_jax.mismatch.selection import explain as loop
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.hyperparameters import settled
-from irb140_jax.recordings.condition import choose_band, conditioned
+from irb140_jax.recordings.band import choose_band
+from irb140_jax.recordings.condition import conditioned
 from irb140_jax.recordings.recording import Recording
 
 FRICTION = tuple(CATALOGUE[slug] for slug in ("coulomb_friction", "position_dependent_friction"))
@@ -118,6 +119,21 @@ def test_a_shape_that_is_dropped_twice_when_refined_is_not_searched_again_but_or
     ex, _ = explained.__wrapped__(6.0)
     assert named[:2] == [True, True] and not named[-1]
     assert {m.slug for m in ex.members} == {"coulomb_friction"}
+
+
+def test_what_is_not_proved_is_not_named_and_the_search_goes_on_without_it():
+    logs, arm = [rubbing(seed, 6.0, WIDTH) for seed in (4, 5)], robot()
+    band, stretch = choose_band(logs, arm), ("position_dependent_friction", (0,))
+    asked = []
+
+    def unproved(ex):
+        asked.append({(m.slug, m.joints) for m in ex.members})
+        return [stretch] if stretch in asked[-1] else []
+
+    sensors = np.full(3, 0.002)
+    ex = explain(arm, conditioned(logs, band), band, FRICTION, 0.05, sensors, unproved=unproved)
+    assert len(asked) == 2 and stretch in asked[0] and asked[1] == {("coulomb_friction", (0,))}
+    assert ex.unproved == (stretch,) and {m.slug for m in ex.members} == {"coulomb_friction"}
 
 
 def test_a_delay_that_was_found_may_be_any_in_the_next_round(monkeypatch):

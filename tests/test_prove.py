@@ -1,17 +1,28 @@
 """What counts as proof on unseen data, where some of the data are the only ones to tell of something."""
 
+import dataclasses
+
 import numpy as np
 import pytest
-from helpers_recordings import recording, robot
+from helpers_recordings import motion, recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
+from irb140_jax.mismatch.regression.gram import JointGram
 from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.selected import noise_left
-from irb140_jax.mismatch.validation.held_out import folds, held_out, held_out_gains, refitted
-from irb140_jax.recordings.condition import Conditioned, choose_band, condition
+from irb140_jax.mismatch.validation.held_out import (
+    folds,
+    held_out,
+    held_out_gains,
+    recordings_of_blocks,
+    refitted,
+    unproved,
+)
+from irb140_jax.recordings.band import choose_band
+from irb140_jax.recordings.condition import Conditioned, condition
 from irb140_jax.recordings.low_pass import Band
 
 FRICTION = tuple(CATALOGUE[slug] for slug in ("coulomb_friction", "viscous_friction"))
@@ -68,6 +79,35 @@ def test_a_finding_is_worth_on_unseen_data_what_is_lost_without_it(alike):
     gains = held_out_gains(alike)
     assert set(gains) == set(alike.chosen)
     assert all(0.0 < gain < 1.0 for gain in gains.values())
+
+
+def contradicted(ex: Explanation, index: int, recording: int) -> Explanation:
+    """As if one recording's torque had gone the other way with a member, many times as much."""
+    joints = []
+    for g, place in zip(ex.by_block.joints, ex.by_block.places, strict=True):
+        at, blocks = place[ex.by_block.columns[index]], g.blocks.copy()
+        for k in at[at >= 0] + len(g.groups):
+            blocks[recordings_of_blocks(ex) == recording, k, -1] *= -100.0
+            blocks[recordings_of_blocks(ex) == recording, -1, k] *= -100.0
+        joints.append(JointGram(g.index, blocks, g.groups, g.rows, g.repeats, g.misfit))
+    return dataclasses.replace(ex, by_block=dataclasses.replace(ex.by_block, joints=tuple(joints)))
+
+
+def test_a_rare_effect_that_other_motions_contradict_is_not_proved():
+    arm, logs = robot(), []
+    for seed in (4, 5, 6):
+        *_, qdd = motion(3, seed=seed)
+        made = recording(seed=seed)
+        logs.append(dataclasses.replace(made, tau=made.tau + 0.2 * qdd * [0.0, 1.0, 0.0]))
+    band = choose_band(logs, arm)
+    smooth = [condition(log, band) for log in logs]
+    effects = (*FRICTION, CATALOGUE["rotor_inertia"])
+    ex = explain(arm, smooth, band, effects, 0.05, np.hypot(*scatter_by_sensor(arm, logs, smooth, band)))
+    (rotor,) = [i for i, m in zip(ex.chosen, ex.members, strict=True) if m.slug == "rotor_inertia"]
+    usual = next(i for i, m in zip(ex.chosen, ex.members, strict=True) if m.effect.prior.ordinary)
+    assert unproved(ex) == []
+    assert unproved(contradicted(ex, rotor, 0)) == [("rotor_inertia", (1,))]
+    assert {slug for slug, _ in unproved(contradicted(ex, usual, 0))} <= {"rotor_inertia"}
 
 
 def test_the_discrepancy_is_carried_only_where_unseen_data_are_better_for_it(alike):

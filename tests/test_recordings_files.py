@@ -16,7 +16,8 @@ from irb140_jax.recordings import (
     rows_of,
     write_recording,
 )
-from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.band import choose_band
+from irb140_jax.recordings.condition import condition
 
 
 @pytest.fixture(scope="module")

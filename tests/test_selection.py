@@ -10,11 +10,11 @@ from scipy import integrate, signal, stats
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
-from irb140_jax.mismatch.output.findings import _log_odds
 from irb140_jax.mismatch.regression.gram import LEVELS, ONE, JointGram, log_prior_of_sizes, own_scale
 from irb140_jax.mismatch.regression.noise import correlation_time
 from irb140_jax.mismatch.selection.averages import probabilities
 from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Space
+from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.hyperparameters import over_shapes, settled
 from irb140_jax.mismatch.selection.kinds import Kinds
 from irb140_jax.mismatch.selection.screening import gains, reshaped
@@ -135,7 +135,7 @@ def test_odds_of_a_finding_without_which_others_are_inadmissible_are_those_again
         others=lambda index: tuple(i for i in (0, 1) if i != index),
         log_posterior=lambda chosen, joints: sets[frozenset(chosen)],
     )  # fmt: skip
-    assert _log_odds(ex, 0) == pytest.approx(6.0)  # pyright: ignore[reportArgumentType]
+    assert Explanation.log_odds(ex, 0) == pytest.approx(6.0)  # pyright: ignore[reportArgumentType]
 
 
 def test_the_prior_of_the_widths_is_a_probability():

@@ -8,7 +8,8 @@ import pytest
 
 from irb140_jax.mismatch.regression.sensor_noise import coarse_positions, scatter_by_sensor
 from irb140_jax.mismatch.regression.sufficient_data import comparable
-from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.band import choose_band
+from irb140_jax.recordings.condition import condition
 from irb140_jax.recordings.low_pass import Band, kernels
 from irb140_jax.recordings.sensors import torque_scatter
 

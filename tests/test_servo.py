@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pandas as pd
 import pytest
-from helpers_servo import JOINTS, KD, KP, closed_loop, two_links
+from helpers_servo import JOINTS, KD, KP, closed_loop, to_and_fro, two_links
+from scipy import signal
 
 import irb140_jax as irb
 from irb140_jax.cli import main
@@ -13,6 +14,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import DiagnoseConfig, diagnose, save
 from irb140_jax.recordings import drive_of_model, read_recording, stated_drive, write_recording
+from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.servo import with_servo_torques, with_torque
 from irb140_jax.report import html_report
 
@@ -99,6 +101,56 @@ def test_logs_of_torque_and_of_commands_are_not_mixed(robot):
     recording, torque = closed_loop(two_links(), duration=3.0)
     with pytest.raises(RecordingError, match="give recordings of one kind"):
         with_servo_torques([recording, dataclasses.replace(recording, qdes=None, tau=torque)], robot, 0.05)
+
+
+# --- what moves a servo ----------------------------------------------------------------------------------------------
+
+SOFT = (20.0, 20.0), (1.5, 1.5)  # gains of a leg: the servo's damping is as large as what its joints weigh
+
+
+def leg(joints=""):
+    xml = two_links(SOFT[0], SOFT[1], shoulder=joints, elbow=joints)
+    light = {'mass="1.2"': 'mass=".6"', 'mass=".7"': 'mass=".15"', ".012 .012 .002": ".004 .004 .001",
+             ".006 .006 .001": ".001 .001 .0003"}  # fmt: skip
+    for old, new in light.items():
+        xml = xml.replace(old, new)
+    return xml
+
+
+LEG = leg('armature=".03" frictionloss=".3" damping=".1"')
+
+
+@pytest.fixture(scope="module")
+def nominal_leg(tmp_path_factory):
+    path = tmp_path_factory.mktemp("model") / "leg.xml"
+    path.write_text(leg())
+    return irb.load_robot(path)
+
+
+def pushed_leg(pushed, seed):
+    recording, _ = to_and_fro(LEG, pushed, seed)
+    return dataclasses.replace(recording, drive=stated_drive(np.array(SOFT[0]), np.array(SOFT[1])))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_comparison_ends_where_more_of_the_motion_is_pushed_than_commanded(nominal_leg, seed):
+    pushed, alone = pushed_leg(0.15, seed), pushed_leg(0.0, seed)
+    rates = (np.diff(x, axis=0) * 200.0 for x in (pushed.q, pushed.q - alone.q))
+    (f, whole), (_, of_pushes) = (signal.welch(x, 200.0, nperseg=400, axis=0) for x in rates)
+    even = [f[(f > 3.0) & (of_pushes[:, j] > 0.5 * whole[:, j])][0] for j in range(2)]
+    bands = [choose_band(with_servo_torques([r], nominal_leg, 0.05)[0], nominal_leg).torque for r in (pushed, alone)]
+    np.testing.assert_allclose(bands[0], min(even), atol=3.0)  # of spectra that resolve 1 Hz
+    assert bands[1] == 20.0  # as wide as any
+
+
+def test_what_pushes_a_servo_is_not_taken_for_a_delay_of_its_torque(nominal_leg):
+    config = DiagnoseConfig(effects=tuple(CATALOGUE[slug] for slug in LIBRARY))
+    result = diagnose(nominal_leg, [pushed_leg(0.4, 2)], config)
+    rotors = {f.joints[0]: f.parameters["inertia"] for f in result.diagnosis.findings if f.effect == "rotor_inertia"}
+    assert set(rotors) == set(JOINTS) and "time_delay" not in {f.effect for f in result.diagnosis.findings}
+    for inertia in rotors.values():
+        assert inertia.value is not None and inertia.std is not None
+        assert abs(inertia.value - 0.03) < 2.0 * inertia.std
 
 
 # --- reading ---------------------------------------------------------------------------------------------------------

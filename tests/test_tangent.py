@@ -10,7 +10,8 @@ from irb140_jax.mismatch.columns.torques import Named, better_known, composed, l
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.regression.rows import Stretch, stretch
 from irb140_jax.mismatch.regression.tangent import delayed, logged, point
-from irb140_jax.recordings.condition import choose_band, condition
+from irb140_jax.recordings.band import choose_band
+from irb140_jax.recordings.condition import condition
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import first_joints, irb140
 

@@ -28,7 +28,7 @@ from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
 from irb140_jax.mismatch.regression.sufficient_data import Comparison, comparison, too_little
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
-from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted
+from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted, unproved
 from irb140_jax.mismatch.validation.testable import reference, visibility
 from irb140_jax.mismatch.validation.unexplained import unexplained
 from irb140_jax.recordings.recording import Recording
@@ -136,7 +136,7 @@ def _explained(
 ) -> Explanation:
     """What the model leaves out, with one scale of all torques where that is probable."""
     scatter, uncertainty = np.hypot(*sensors), config.inertial_uncertainty
-    ex = explain(data.robot, data.smooth, data.band, config.effects, uncertainty, scatter, progress)
+    ex = explain(data.robot, data.smooth, data.band, config.effects, uncertainty, scatter, progress, unproved)
     ex = without_negligible(ex, data.servo)
     return dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= settings.NAMED)
 

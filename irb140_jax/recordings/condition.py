@@ -7,28 +7,19 @@ from measurement and model alike.
 import dataclasses
 from collections.abc import Sequence
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from scipy import interpolate, ndimage
 
-from irb140_jax import dynamics
 from irb140_jax.recordings.direction import REST, direction_of
 from irb140_jax.recordings.drive import DELAY_WIDTH, ROWS_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.smooth import noise_density, signal_limit, white_density, without_noise
-from irb140_jax.robot import Robot
+from irb140_jax.recordings.smooth import white_density, without_noise
 
-MAX_TORQUE_BAND = 20.0  # Hz; above this, arms are not rigid and motor torque holds mostly current ripple
-MIN_TORQUE_BAND = 4.0  # Hz; friction reversals are steps, a narrower band would blur them into the inertia
-WORKING_RATE = 200.0  # Hz; columns are evaluated at least this often
-SLOW = 3.0  # Hz; below, model and log may differ by the very friction that is looked for
 CREEPING = 1e-3  # of a joint's highest speed in any recording: slower, what holds it may be dry friction that gives way
 OUTLIER = 10.0  # times what a torque usually differs by from its neighbours: a spike of the log ...
 LONE = 3.0  # ... if as many times what those differ by among themselves
 INEXACT = 0.01  # of a servo's torque, by which its law may differ from the torque that it makes
-INCOHERENT = 0.05  # share of the model's torque that may be noise: what biases parameters by as much
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,82 +84,6 @@ class Conditioned:
     servo: Commanded | None = None
 
 
-def choose_band(recordings: list[Recording], robot: Robot) -> Band:
-    """The band in which positions carry motion, and the model's torque means something, in all recordings alike.
-
-    Two limits: the positions' spectrum must stand above their noise, and differentiated positions must not fill the
-    model's torque with what the logged torque knows nothing of (noise, play, flexibility), for regressors that hold
-    noise bias every parameter towards zero.
-    """
-    top, rates = [], []
-    for recording in recordings:
-        t, q, _, _ = _even(recording)
-        rate = (len(t) - 1) / (t[-1] - t[0])
-        rates.append(rate)
-        density = noise_density(recording, t, rate)
-        top.append([signal_limit(x, d, rate) for x, d in zip(q.T, density, strict=True)])
-    # The fastest recording decides; within it, the middling joint: a still joint says nothing, a noisy one too much.
-    limit = max((float(np.median([f for f in row if f > 0] or [0.0])) for row in top), default=0.0)
-    slowest = float(min(rates))
-    highest = max(min(MAX_TORQUE_BAND, slowest / 6.0), 1.0)
-    band = _band(float(np.clip(2.0 * limit, min(MIN_TORQUE_BAND, highest), highest)), slowest)
-    coherent = _coherent_limit(recordings, robot, band)
-    return _band(max(min(band.torque, coherent), min(MIN_TORQUE_BAND, highest)), slowest)
-
-
-def _band(torque: float, rate: float) -> Band:
-    """The band with this torque cut-off for recordings of this rate."""
-    working = min(max(WORKING_RATE, 8.0 * torque), rate)
-    return Band(torque, min(1.6 * torque, 0.4 * rate), working, max(1, int(working / (2.2 * torque))))
-
-
-def _coherent_limit(recordings: list[Recording], robot: Robot, band: Band) -> float:
-    """Highest frequency [Hz] up to which the model's torque is not filled with what the log and friction don't show.
-
-    Of the model's torque m, the part incoherent with the logged torque and the direction of motion is summed from
-    `SLOW` upwards; it must stay below `INCOHERENT` of the whole power, for every joint.  What friction a regression
-    below `SLOW` finds is taken off the logged torque first: where friction rules, m and the log would not match at all.
-    """
-    smooth = [condition(r, band) for r in recordings]
-    window = int(band.rate)  # one second: resolves 1 Hz
-    living = np.stack([np.ones(robot.n, dtype=bool) if r.torque_lost is None else ~r.torque_lost.any(axis=0)
-                       for r in recordings])  # fmt: skip
-    f = np.fft.rfftfreq(window, 1.0 / band.rate)
-    spectra = np.zeros((robot.n, len(f), 4, 4), dtype=complex)
-    taper = np.hanning(window)[:, None]
-    passive = lambda r: (r.stiffness, r.damping, r.frictionloss)  # noqa: E731
-    moving = eqx.tree_at(passive, robot, (jnp.zeros(robot.n),) * 3)
-    for r, alive in zip(smooth, living, strict=True):
-        m = np.asarray(dynamics.inverse_dynamics_batch(moving, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
-        friction = np.concatenate([r.direction, r.qd], axis=1)
-        slow = filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), kernels(SLOW, band.rate)[0])
-        for j in np.flatnonzero(alive):
-            inputs = np.concatenate([slow[:, [robot.n + j, 2 * robot.n + j]], slow[:, 3 * robot.n :]], axis=1)
-            inputs = np.concatenate([inputs, np.ones((len(inputs), 1))], axis=1)
-            w = np.linalg.lstsq(inputs, slow[:, j], rcond=1e-6)[0]
-            x = np.stack([m[:, j], r.tau[:, j] - friction @ w[2:-1], r.direction[:, j], r.tau[:, j]], axis=1)
-            for start in range(0, len(x) - window + 1, window // 2):
-                piece = x[start : start + window]
-                F = np.fft.rfft((piece - piece.mean(axis=0)) * taper, axis=0)
-                spectra[j] += np.einsum("fa,fb->fab", F.conj(), F)
-    limit = band.torque
-    for s in spectra[:, 1:]:
-        power, inputs, cross = s[:, 0, 0].real, s[:, 1:3, 1:3], s[:, 1:3, 0]
-        if power.sum() <= 0:
-            continue
-        ridge = 1e-9 * np.trace(inputs, axis1=1, axis2=2).real[:, None, None] + 1e-300
-        known = np.einsum(
-            "fa,fa->f", cross.conj(), np.linalg.solve(inputs + ridge * np.eye(2), cross[..., None])[..., 0]
-        )
-        unknown = np.where(f[1:] > SLOW, np.clip(power - known.real, 0.0, None), 0.0)
-        # Noise in a model torque that is small beside the logged one does no harm.
-        share = np.cumsum(unknown) / np.maximum(np.cumsum(power), np.cumsum(s[:, 3, 3].real))
-        over = np.flatnonzero(share > INCOHERENT)
-        if len(over):
-            limit = min(limit, float(f[1:][over[0]]))
-    return limit
-
-
 def conditioned(recordings: Sequence[Recording], band: Band) -> list[Conditioned]:
     """Recordings that are compared with one model; see `condition`.
 
@@ -199,7 +114,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
         recording = dataclasses.replace(recording, tau=np.zeros_like(recording.q))
     tau, spikes = (recording.tau, 0) if recording.is_servo_log else _despiked(recording.tau)  # commands may jump
     # Before samples are moved, which would make two of one.
-    t, q, tau, missing = _even(dataclasses.replace(recording, tau=tau))
+    t, q, tau, missing = even(dataclasses.replace(recording, tau=tau))
     raw_rate = (len(t) - 1) / (t[-1] - t[0])
     h, h1, h2 = kernels(band.position, raw_rate)
     half = (len(h) - 1) // 2
@@ -292,8 +207,8 @@ def _within_a_step(recording: Recording) -> np.ndarray:
     return span < 1.5 * step
 
 
-def _even(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """t, q, tau on an even grid and the rows that lie in a gap."""
+def even(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """t (T,), q and tau (T, n) of a recording on an even grid, and which rows lie in a gap, (T,)."""
     t, dt = recording.t, np.diff(recording.t)
     step = float(np.median(dt))
     if np.max(np.abs(dt - step)) < 0.02 * step:

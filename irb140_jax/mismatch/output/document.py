@@ -21,6 +21,7 @@ from irb140_jax.mismatch.output.notes import (
     notes,
     rest_notes,
     timing_notes,
+    unproved_notes,
 )
 from irb140_jax.mismatch.output.servos import command_notes, harmful_notes, of_servos, servo_sentence
 from irb140_jax.mismatch.output.summary import open_sentence, summary, verdict
@@ -160,7 +161,7 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     return [
         *of.data.servo_notes, *harmful_notes(robot, of.harmful), *open_joints,
         *rest_notes(robot, of.proof, np.hypot(*of.sensors)),
-        *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names),
-        *clocks, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
+        *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names), *clocks,
+        *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
         *notes(of.data, of.uncertainty, judged), *gap_notes(robot, gap, torque, lacking),
     ]  # fmt: skip

@@ -27,7 +27,7 @@ def findings(robot: Robot, ex: Explanation) -> list[Finding]:
         values = parameters_of(robot, ex, index, w[rows], cov[rows, rows])
         joints = tuple(robot.joint_names[j] for j in c.joints)
         numbers, units = {k: v.value or 0.0 for k, v in values.items()}, {k: v.unit for k, v in values.items()}
-        odds, gain = _log_odds(ex, index), gains[index]
+        odds, gain = ex.log_odds(index), gains[index]
         out.append((odds, Finding(
             c.slug, joints, c.effect.sentence(", ".join(joints), numbers, units), values,
             Evidence(odds, ex.probability(index), gain),
@@ -62,27 +62,6 @@ def torque_scale_finding(robot: Robot, ex: Explanation) -> list[Finding]:
         "only a known payload can tell wrong torque constants from masses that are all wrong by one factor.",
         (),
     )]  # fmt: skip
-
-
-def _log_odds(ex: Explanation, index: int) -> float:
-    """Log posterior odds of a finding against the set without it; of friction also against ordinary friction.
-
-    Where others are inadmissible without it, against the best set without it that the search visited.
-    """
-    if index in ex.falls:
-        return ex.falls[index].log_odds
-    c, rest = ex.data.candidates[index], ex.others(index)
-    options = [rest]
-    if c.effect.place.is_friction and not c.effect.prior.ordinary:
-        taken = {(m.slug, m.joints) for m in ex.members}
-        usual = [i for i, o in enumerate(ex.data.candidates) if o.effect.prior.ordinary and o.joints == c.joints]
-        options.append((*rest, *(i for i in usual if (ex.data.candidates[i].slug, c.joints) not in taken)))
-    joints = list(c.joints)
-    without = max(ex.log_posterior(o, joints) for o in options)
-    if not np.isfinite(without):
-        here = {i for i, o in enumerate(ex.data.candidates) if (o.slug, o.joints) == (c.slug, c.joints)}
-        without = max((value for other, value in ex.sets.items() if not other & here), default=-np.inf)
-    return ex.log_posterior(ex.chosen, joints) - without
 
 
 def _alternatives(ex: Explanation, index: int) -> tuple[Alternative, ...]:

@@ -78,6 +78,18 @@ def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
     ]
 
 
+def unproved_notes(ex: Explanation) -> list[str]:
+    """A note for every effect that the search found and unseen data contradict."""
+    names, out = ex.lib.robot.joint_names, []
+    for slug, joints in ex.unproved:
+        title = ex.lib.effects[slug].title
+        out.append(
+            f"{title[0].upper()}{title[1:]} on {', '.join(names[j] for j in joints)} would fit these recordings, but "
+            "makes the error on unseen data larger by more than that is worth: it is not named."
+        )
+    return out
+
+
 def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out: Sequence[str]) -> list[str]:
     """A note for every joint at which `corrected.xml` gives another torque than the corrected model.
 

@@ -47,6 +47,7 @@ def explain(
     uncertainty: float,
     sensors: np.ndarray,
     progress: Callable[[str], None] = lambda _: None,
+    unproved: Callable[[Explanation], Sequence[Site]] = lambda _: (),
 ) -> Explanation:
     """Search for what the model leaves out.
 
@@ -58,6 +59,7 @@ def explain(
         uncertainty: Relative standard deviation of the inertials.
         sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         progress: Told what is being done.
+        unproved: Effects of an explanation that may not be named; the search goes on without them.
     """
     progress("rigid body along the recordings")
     along, factor = all_prepared(robot, recordings), inertial_prior_factor(robot, 1.0)
@@ -67,9 +69,12 @@ def explain(
     start = _Start(1, first, along, [None] * len(along))
     while True:
         ex, last = _explained(given, start)
-        if last:
+        if not last:
+            start = _next(given, start, ex)
+        elif barred := unproved(ex):
+            start = start.without(barred)
+        else:
             return ex
-        start = _next(given, start, ex)
         del ex  # hundreds of megabytes, before the next
 
 
@@ -107,6 +112,7 @@ class _Start:
         chosen: The set with which the search starts: candidates of `lib`.
         noise: What the last explanation leaves.
         dropped: Effects that were named and then dropped when their shape was refined, each as often as that happened.
+        unproved: Effects that may not be named.
     """
 
     round: int
@@ -118,6 +124,13 @@ class _Start:
     chosen: tuple[int, ...] = ()
     noise: Noise | None = None
     dropped: tuple[Site, ...] = ()
+    unproved: tuple[Site, ...] = ()
+
+    def without(self, sites: Sequence[Site]) -> "_Start":
+        """The same round, in which some effects are not named."""
+        every = with_loose_inertials(self.lib)
+        left = tuple(i for i in self.chosen if site_of(every[i]) not in sites)
+        return dataclasses.replace(self, chosen=left, unproved=(*self.unproved, *sites))
 
     def searched(self) -> tuple[Library, tuple[int, ...]]:
         """The library that this round searches, and the set with which it starts as candidates of that."""
@@ -155,7 +168,8 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     del sums  # hundreds of megabytes, before the search
     first = of_kinds(given.first, lib.effects)
     space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
-    barred = [start.dropped.count(site_of(c)) >= OFTEN for c in data.candidates]
+    sites = [site_of(c) for c in data.candidates]
+    barred = [start.dropped.count(site) >= OFTEN or site in start.unproved for site in sites]
     without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
     best, hyper, sets = selected(without_barred, chosen, every_move=start.whole)
     if at and not at.rests_on <= _sites(data, best):
@@ -172,8 +186,9 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
     data = dataclasses.replace(data, stretches=held)
     ex = Explanation(
-        lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls
-    )
+        lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
+        unproved=start.unproved,
+    )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
 
 
@@ -202,7 +217,7 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     every = with_loose_inertials(start.lib)
     refined = {site_of(every[i]) for i in start.chosen if not start.whole and every[i].effect.shapes.finer}
     lost = refined - _sites(ex.data, ex.chosen)
-    return _Start(turn, lib, along, loads, whole, at, chosen, noise, (*start.dropped, *lost))
+    return _Start(turn, lib, along, loads, whole, at, chosen, noise, (*start.dropped, *lost), start.unproved)
 
 
 def _first_noise(

@@ -15,7 +15,7 @@ from irb140_jax.mismatch.regression.gaussian import Posterior
 from irb140_jax.mismatch.regression.gram import LEVELS
 from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.regression.nuisances import Nuisances
-from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities
+from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.falling_friction import Fall
 from irb140_jax.mismatch.selection.hyperparameters import settled
@@ -41,6 +41,7 @@ class Explanation:
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
         falls: Members that are named because friction certainly falls with speed, whatever its form.
         scaled: Whether one scale of all logged torques is a finding.
+        unproved: What the search found and the error on unseen data does not bear out: not named.
     """
 
     lib: Library
@@ -56,6 +57,7 @@ class Explanation:
     factor: np.ndarray
     falls: Mapping[int, Fall] = dataclasses.field(default_factory=dict)
     scaled: bool = False
+    unproved: tuple[Site, ...] = ()
 
     @property
     def members(self) -> list[Candidate]:
@@ -191,6 +193,26 @@ class Explanation:
                 into[rows, own] = self.data.scale[self.data.nuisances + c.columns]
             first += len(own)
         return of_bodies(mean, cov, into, np.asarray(self.lib.robot.phi), self.factor)
+
+    def log_odds(self, index: int) -> float:
+        """Log posterior odds of a finding against the set without it; of friction also against ordinary friction.
+
+        Where others are inadmissible without it, against the best set without it that the search visited.
+        """
+        if index in self.falls:
+            return self.falls[index].log_odds
+        every, c, rest = self.data.candidates, self.data.candidates[index], self.others(index)
+        options = [rest]
+        if c.effect.place.is_friction and not c.effect.prior.ordinary:
+            taken = {site_of(m) for m in self.members}
+            usual = [i for i, o in enumerate(every) if o.effect.prior.ordinary and o.joints == c.joints]
+            options.append((*rest, *(i for i in usual if site_of(every[i]) not in taken)))
+        joints = list(c.joints)
+        without = max(self.log_posterior(o, joints) for o in options)
+        if not np.isfinite(without):
+            here = {i for i, o in enumerate(every) if site_of(o) == site_of(c)}
+            without = max((value for other, value in self.sets.items() if not other & here), default=-np.inf)
+        return self.log_posterior(self.chosen, joints) - without
 
     def probability(self, index: int) -> float:
         """Of a chosen candidate's effect at its joints, over all sets visited."""

@@ -9,6 +9,7 @@ from irb140_jax.mismatch.regression.gaussian import Posterior, grams, posterior
 from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.regression.rows import Stretch
+from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 
 SETTLED = 2  # rounds in which the noise and what leaves it agree
@@ -224,10 +225,32 @@ def _of_own(extra: Nuisances, w: list[np.ndarray]) -> np.ndarray:
 
 def held_out_gains(ex: Explanation) -> dict[int, float]:
     """Share of the whitened squared error on unseen data, noise included, that each finding removes."""
-    left_out = folds(ex)
-    whole = _unseen_error(ex, ex.chosen, left_out)
-    without = {i: _unseen_error(ex, ex.others(i), left_out) for i in ex.chosen}
+    whole, without = _unseen_errors(ex)
     return {i: (error - whole) / max(error, 1e-300) for i, error in without.items()}
+
+
+def unproved(ex: Explanation) -> list[Site]:
+    """The rare effect whose loss on unseen data outweighs its log odds by the most, if one's does.
+
+    Evidence trusts that some law is true.  Where none of them knows what the model errs by, one may fit all the same,
+    and motions that the fit did not see tell.  Both are in nats.
+    """
+    whole, without = _unseen_errors(ex)
+    lost = {i: 0.5 * (whole - error) for i, error in without.items() if error < whole and _is_rare(ex, i)}
+    weight = {i: ex.log_odds(i) - nats for i, nats in lost.items()}
+    return [site_of(ex.data.candidates[i]) for i in sorted(weight, key=lambda i: weight[i])[:1] if weight[i] < 0.0]
+
+
+def _is_rare(ex: Explanation, index: int) -> bool:
+    """Whether a finding is an effect that few robots have, named for its law."""
+    c = ex.data.candidates[index]
+    return not (c.effect.prior.ordinary or c.is_inertials or index in ex.falls)
+
+
+def _unseen_errors(ex: Explanation) -> tuple[float, dict[int, float]]:
+    """Whitened squared error on unseen data of an explanation, and of it without each finding."""
+    left_out = folds(ex)
+    return _unseen_error(ex, ex.chosen, left_out), {i: _unseen_error(ex, ex.others(i), left_out) for i in ex.chosen}
 
 
 def _unseen_error(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> float:
