@@ -11,6 +11,7 @@ bam_xl330: the duty cycle that was logged is withheld.  Every machine's result i
 import dataclasses
 import json
 import pathlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from scipy import signal
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.mismatch import Result, diagnose, predict
+from irb140_jax.mismatch.motion.models import compiled_robot, simulated
+from irb140_jax.oracle.rollout import positions
 from irb140_jax.recordings import Recording
 from irb140_jax.recordings.drive import Drive
 from irb140_jax.recordings.machines import (
@@ -31,8 +34,9 @@ from irb140_jax.recordings.machines import (
     so101_model,
     so101_recording,
 )
+from irb140_jax.recordings.machines.so101 import HELD_OUT as ARM_UNSEEN
 from irb140_jax.recordings.machines.unitree_go2 import HELD_OUT, LEGS, PARTS, SWEEPS, go2_joints
-from irb140_jax.recordings.servo import with_torque
+from irb140_jax.recordings.servo import taken_up, with_torque
 from irb140_jax.robot import load_robot
 
 CUTOFF, ENDS = 15.0, 0.15  # Hz and s of the baseline's comparison: both sides filtered both ways, ends left out
@@ -41,6 +45,7 @@ BASELINE = {"A": (0.093, 0.058, 0.266), "B": (0.136, 0.092, 0.305)}
 RIGID = {"A": (0.401, 0.403, 1.237), "B": (0.465, 0.489, 1.451)}
 ARM_MOTIONS = ("chirp_sweep", "multisine")
 JUDGED = 400  # gain of the pendulum's runs that are kept back
+SIMULATED = 1e-3  # s of a step
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,9 +57,29 @@ class Config:
 
 
 def told(result: Result) -> dict[str, Any]:
-    """What a diagnosis says, without its provenance."""
-    diagnosis = result.diagnosis.to_json()
-    return {key: diagnosis[key] for key in ("verdict", "summary", "findings", "unexplained", "fit", "notes")}
+    """What a diagnosis says, without its provenance, and its proof in motion over whole runs."""
+    diagnosis, motion = result.diagnosis.to_json(), result.views.motion
+    said = {key: diagnosis[key] for key in ("verdict", "summary", "findings", "unexplained", "fit", "notes")}
+    return said | {"whole_run": motion and motion["whole_run"]}
+
+
+def off(result: Result, runs: Sequence[Recording]) -> dict[str, list[np.ndarray]]:
+    """Positions less those simulated from the commands of runs that the fit did not see, by model [rad].
+
+    Of the corrected model it is its file alone, without what MJCF can't hold.
+    """
+    robot, out = result.model.robot, {name: [] for name in ("nominal", "refit", "corrected")}
+    models = simulated(result.model, compiled_robot(robot, SIMULATED), SIMULATED)
+    assert models is not None
+    for run in runs:
+        assert run.drive is not None
+        times = np.arange(run.t[0], run.t[-1], SIMULATED)
+        asked = np.stack([np.interp(times, run.t, x) for x in taken_up(run, run.drive).T], axis=1)[None]
+        for name, apart in out.items():
+            start, still = run.q[:1], np.zeros_like(run.q[:1])
+            went = positions([models.driven(name, run.drive)], start, still, np.zeros_like(asked), asked)[0, :-1]
+            apart.append(run.q - np.stack([np.interp(run.t, times, x) for x in went.T], axis=1))
+    return out
 
 
 def go2() -> dict[str, Any]:
@@ -65,7 +90,12 @@ def go2() -> dict[str, Any]:
         for leg in LEGS:
             robot, run = load_robot(go2_model(), go2_joints(leg)), go2_recording(leg)
             result = diagnose(robot, go2_split(run, split)[0])
-            legs[leg] = {"heldout": heldout(result, run, HELD_OUT[split]), **told(result)}
+            unseen = off(result, [run])
+            rows = np.concatenate([np.arange(SWEEPS[k - 1], SWEEPS[k]) for k in HELD_OUT[split]])
+            legs[leg] = {
+                "heldout": heldout(result, run, HELD_OUT[split]), **told(result),
+                "position_rmse": {name: rms(x[0][rows]).tolist() for name, x in unseen.items()},
+            }  # fmt: skip
             print(split, leg, legs[leg]["heldout"], flush=True)
         over = {
             model: np.sqrt(np.mean([np.square(x["heldout"][model]) for x in legs.values()], axis=0)).tolist()
@@ -94,10 +124,17 @@ def heldout(result: Result, run: Recording, sweeps: tuple[int, ...]) -> dict[str
 def so101() -> dict[str, Any]:
     """A diagnosis of five joints, and one of the wrist roll that is blocked."""
     robot = load_robot(so101_model(), tuple(so101_recording("multisine").joint_names))
-    whole = told(diagnose(robot, [so101_recording(motion) for motion in ARM_MOTIONS]))
+    result = diagnose(robot, [so101_recording(motion) for motion in ARM_MOTIONS])
+    apart = off(result, [so101_recording(motion) for motion in ARM_UNSEEN])
+    whole = told(result) | {"position_rmse": {name: rms(np.concatenate(x)).tolist() for name, x in apart.items()}}
     roll = load_robot(so101_model(), ("wrist_roll",))
     stop = told(diagnose(roll, [only(so101_recording("single_joint_wrist_roll"), "wrist_roll")]))
     return {"motions": list(ARM_MOTIONS), "arm": whole, "blocked_wrist_roll": stop}
+
+
+def rms(x: np.ndarray) -> np.ndarray:
+    """Root mean square of each column."""
+    return np.sqrt(np.mean(x**2, axis=0))
 
 
 def only(r: Recording, joint: str) -> Recording:
@@ -115,7 +152,10 @@ def bam(folder: pathlib.Path) -> dict[str, Any]:
     model = folder / "servo.xml"
     model.write_text(servo_model(), encoding="utf-8")
     robot = load_robot(model)
-    return told(diagnose(robot, [servo_commands(name) for name, (kp, _) in servo_runs().items() if kp != JUDGED]))
+    result = diagnose(robot, [servo_commands(name) for name, (kp, _) in servo_runs().items() if kp != JUDGED])
+    apart = off(result, [servo_commands(name) for name, (kp, _) in servo_runs().items() if kp == JUDGED])
+    mean = {name: float(np.mean([np.abs(x).mean() for x in each])) for name, each in apart.items()}
+    return told(result) | {"position_error": mean}
 
 
 def main() -> None:

@@ -168,7 +168,8 @@ def test_where_every_model_is_lost_the_text_says_from_when():
     curve = lambda *values: {"median": list(values), "p90": list(values)}  # noqa: E731
     tool = {"unit": "mm", "nominal": curve(1.0, 9.0, None), "refit": curve(1.0, 8.0, 90.0),
             "corrected": curve(0.1, 2.0, 40.0), "moved": curve(3.0, 6.0, 20.0)}  # fmt: skip
-    made = {"horizon": [0.1, 0.5, 2.0], "windows": 7, "tool": tool, "whole_run": None, "as_torque": [], "followed": []}
+    made = {"horizon": [0.1, 0.5, 2.0], "windows": 7, "tool": tool, "whole_run": None, "as_torque": [], "followed": [],
+            "driven_by": "torque"}  # fmt: skip
     assert lost(made) == 2.0
     assert any("From 2 s on every model is farther off" in sentence for sentence in sentences(made))
     tool["corrected"] = curve(0.1, 2.0, 19.0)

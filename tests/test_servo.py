@@ -2,6 +2,10 @@
 
 import dataclasses
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,6 +13,7 @@ from helpers_servo import JOINTS, KD, KP, closed_loop, to_and_fro, two_links
 from scipy import signal
 
 import irb140_jax as irb
+from irb140_jax import dynamics
 from irb140_jax.cli import main
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
@@ -239,3 +244,50 @@ def test_viscous_friction_of_a_servo_is_said_to_be_known_only_with_kd(robot):
     known = float(said.split("the sum of both, ")[1].split(",")[0])
     assert "can't be told from the drive's Kd" in said
     assert abs(known - 2.4) < 0.05  # Kd 2 and 0.4: known better than either
+
+
+# --- the proof in motion and the file to take away --------------------------------------------------------------------
+
+
+def test_the_corrected_model_goes_where_commands_sent_the_robot(rubbing):
+    motion = rubbing.views.motion
+    assert motion is not None and motion["driven_by"] == "commands" and not motion["followed"]
+    assert not any("torque alone" in sentence for sentence in motion["sentences"])
+    elbow, at = motion["joints"]["elbow"], motion["horizon"].index(0.5)
+    assert elbow["corrected"]["median"][at] < 0.5 * elbow["refit"]["median"][at]
+    # A servo brings every model back to its command: nothing flies away over a whole run.
+    whole = motion["whole_run"]["joints"]["elbow"]
+    assert whole["corrected"] < 0.5 * whole["refit"] < 0.1 * whole["moved"]
+
+
+def test_the_report_says_that_commands_drove_the_models(rubbing):
+    page = html_report(rubbing.diagnosis, rubbing.views)
+    assert "recorded commands through the law of the servos" in " ".join(page.split())
+
+
+def test_the_file_has_servos_that_move_it_as_our_own_dynamics_with_their_law(rubbing, tmp_path):
+    save(rubbing, tmp_path)
+    dt = 1e-4  # MuJoCo's step is of first order
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "corrected.xml"))
+    np.testing.assert_allclose(drive_of_model(tmp_path / "corrected.xml", JOINTS).kp, drive_of(rubbing.model).kp)
+    model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, dt
+    model.dof_frictionloss[:] = 0.0  # a step of its own in either simulation
+    arm = irb.load_robot(tmp_path / "corrected.xml")
+    arm = eqx.tree_at(lambda r: r.frictionloss, arm, jnp.zeros(2))
+    kp, kd = drive_of(rubbing.model).kp, drive_of(rubbing.model).kd
+    times = jnp.arange(0.0, 1.0, dt)
+    wanted = 0.5 * jnp.sin(jnp.stack([4.0 * times, 6.0 * times + 1.0], axis=1))
+
+    def step(state, command):
+        def rate(x):
+            return jnp.stack([x[1], dynamics.forward_dynamics(arm, x[0], x[1], kp * (command - x[0]) - kd * x[1])])
+
+        half = state + 0.5 * dt * rate(state)
+        return state + dt * rate(half), state[0]
+
+    _, ours = jax.lax.scan(step, jnp.zeros((2, 2)), wanted)
+    data, theirs = mujoco.MjData(model), np.empty(ours.shape)
+    for k, command in enumerate(np.asarray(wanted)):
+        theirs[k], data.ctrl[:] = data.qpos, command
+        mujoco.mj_step(model, data)
+    np.testing.assert_allclose(theirs, ours, atol=1e-3 * np.abs(ours).max())

@@ -1,4 +1,4 @@
-"""MuJoCo's C engine forward in time under given joint torques, many motions side by side: NumPy in, NumPy out."""
+"""MuJoCo's C engine forward in time under given torques and controls, many motions side by side: NumPy in and out."""
 
 import copy
 import os
@@ -30,6 +30,7 @@ def positions(
     q: Float[np.ndarray, "B n"],
     qd: Float[np.ndarray, "B n"],
     tau: Float[np.ndarray, "B S n"],
+    control: Float[np.ndarray, "B S n"] | None = None,
 ) -> Float[np.ndarray, "B S+1 n"]:
     """Joint positions of motions under torques, one model each, from start to end [rad or m].
 
@@ -40,15 +41,18 @@ def positions(
         models: From `simulated_model`, all of one robot.
         q: Where each motion starts [rad or m].
         qd: Speeds half a step before that [rad/s or m/s].
-        tau: Torque on the joints during each step [N m or N].
+        tau: Torque on the joints during each step [N m or N], beside that of the actuators.
+        control: Of the actuators during each step; zero where None.
     """
     n = q.shape[1]
     start = np.concatenate([np.zeros((len(q), 1)), q, qd], axis=1)  # of mjSTATE_FULLPHYSICS: time, qpos, qvel
     threads = [mujoco.MjData(models[0]) for _ in range(min(len(q), os.cpu_count() or 1))]
     mujoco.set_mju_user_warning(lambda _: None)  # or MuJoCo writes a file about motions that fly away
     try:
-        spec = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-        state, _ = rollout.rollout(list(models), threads, start, np.ascontiguousarray(tau), control_spec=spec)
+        spec, given = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), np.ascontiguousarray(tau)
+        if control is not None:  # comes first in MuJoCo's order
+            spec, given = spec | int(mujoco.mjtState.mjSTATE_CTRL), np.concatenate([control, tau], axis=-1)
+        state, _ = rollout.rollout(list(models), threads, start, given, control_spec=spec)
     finally:
         mujoco.set_mju_user_warning(None)
     ended = np.diff(state[..., :1], axis=1, prepend=0.0) <= 0.0  # MuJoCo gave up: time stands still

@@ -14,6 +14,7 @@ from irb140_jax.recordings.direction import REST, direction_of
 from irb140_jax.recordings.drive import DELAY_WIDTH, ROWS_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.servo import taken_up
 from irb140_jax.recordings.smooth import white_density, without_noise
 
 CREEPING = 1e-3  # of a joint's highest speed in any recording: slower, what holds it may be dry friction that gives way
@@ -28,12 +29,14 @@ class Commanded:
 
     Attributes:
         drive: Its gains, none unknown but of joints that are not judged.
+        command: Commanded positions when they are taken up [rad or m], shape (T, n).
         command_rate: Derivative of the commanded positions, anti-aliased as the torque [rad/s or m/s], shape (T, n).
         asked_speed: Commanded speeds [rad/s or m/s], shape (T, n).
         delay_width: Standard deviation of the time at which commands are taken up [s].
     """
 
     drive: Drive
+    command: np.ndarray
     command_rate: np.ndarray
     asked_speed: np.ndarray
     delay_width: float
@@ -163,7 +166,8 @@ def _commanded(
     speed = np.zeros_like(wanted) if recording.qddes is None else filtered(
         _at(t, recording.t, recording.qddes), anti_alias)  # fmt: skip
     width = max(DELAY_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
-    return Commanded(recording.drive, _at(grid, t, rate), _at(grid, t, speed), width)
+    command = _at(grid, recording.t, taken_up(recording, recording.drive))
+    return Commanded(recording.drive, command, _at(grid, t, rate), _at(grid, t, speed), width)
 
 
 def _lost_torque(recording: Recording, grid: np.ndarray, reach: int) -> np.ndarray:

@@ -69,7 +69,7 @@ def with_servo_torques(
 def with_torque(recording: Recording, drive: Drive) -> Recording:
     """A recording with the torque of drives whose gains are known; a joint of unknown Kp has lost its torque."""
     assert recording.qdes is not None
-    error, qd = position_error(recording, drive), speed(recording)
+    error, qd = taken_up(recording, drive) - recording.q, speed(recording)
     against = qd if recording.qddes is None else qd - recording.qddes
     known = np.isfinite(drive.kp)
     kp, kd = np.where(known, drive.kp, 0.0), np.where(known, np.nan_to_num(drive.kd), 0.0)
@@ -80,11 +80,11 @@ def with_torque(recording: Recording, drive: Drive) -> Recording:
     return dataclasses.replace(recording, tau=tau, drive=drive, torque_lost=lost if lost.any() else None)
 
 
-def position_error(recording: Recording, drive: Drive) -> np.ndarray:
-    """Command less position, with the command cut to its range and as late as it is stated to be, shape (T, n)."""
+def taken_up(recording: Recording, drive: Drive) -> np.ndarray:
+    """Commanded positions, cut to their range and as late as they are stated to be [rad or m], shape (T, n)."""
     t, wanted = recording.t, np.clip(np.asarray(recording.qdes), drive.low, drive.high)
     late = [np.interp(t - d, t, x) if d else x for d, x in zip(drive.delay, wanted.T, strict=True)]
-    return np.stack(late, axis=1) - recording.q
+    return np.stack(late, axis=1)
 
 
 def speed(recording: Recording) -> np.ndarray:

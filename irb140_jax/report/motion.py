@@ -19,6 +19,7 @@ def motion_section(proof: Mapping) -> dict:
     at = [proof["horizon"].index(time) for time in SHOWN_AT]
     rows = [("tool", proof["tool"]), *proof["joints"].items()]
     return {
+        "driven_by": proof["driven_by"],
         "times": SHOWN_AT,
         "shown": proof["shown"],
         "figure": _figure(proof, proof["joints"].get(proof["shown"], proof["tool"]), proof["shown"]),

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from irb140_jax.robot.drive import ServoGains
 from irb140_jax.robot.robot import Robot
 from irb140_jax.robot.tree import children
 
 
-def robot_mjcf(robot: Robot, option: str = "", flag: str = "") -> str:
+def robot_mjcf(robot: Robot, option: str = "", flag: str = "", servos: ServoGains | None = None) -> str:
     """MJCF of the chain or tree: inertials, rotors, friction, springs, limits, motors with their gears, and the tool.
 
     Shapes to draw or to touch are no part of a `Robot`, so there are none.
@@ -15,13 +16,15 @@ def robot_mjcf(robot: Robot, option: str = "", flag: str = "") -> str:
         robot: Arm with n joints and concrete numbers; every link with a possible inertia.
         option: Attributes of <option> beside gravity, as XML.
         flag: Attributes of <option><flag>, as XML.
+        servos: Position servos that stand in the place of motors, but where their kp is NaN.
 
     Returns:
         The XML.  Loaded again, every number is the same to rounding.
     """
     base = f'<body name="base" {_placed(robot.base_rotation, robot.base_position)}>{_carried_by(robot, -1)}\n</body>'
     gravity = _text(np.asarray(robot.base_rotation) @ np.asarray(robot.gravity))
-    motors = "\n".join(_motor(robot, i) for i in range(robot.n))
+    motors = "\n".join(_motor(robot, i) if servos is None or np.isnan(servos.kp[i]) else _servo(robot, i, servos)
+                       for i in range(robot.n))  # fmt: skip
     return (
         f'<mujoco model="{_escaped(robot.name)}">\n'
         '<compiler angle="radian" autolimits="true" boundmass="1e-12" boundinertia="1e-15"/>\n'
@@ -66,6 +69,17 @@ def _motor(robot: Robot, i: int) -> str:
     limit = f' forcerange="{_text([-effort / abs(gear), effort / abs(gear)])}"' if np.isfinite(effort) else ""
     name = _escaped(robot.joint_names[i])
     return f'<motor name="{name}" joint="{name}" gear="{_text(gear)}"{limit}/>'
+
+
+def _servo(robot: Robot, i: int, servos: ServoGains) -> str:
+    """A position servo; its control is the commanded position."""
+    numbers = {"kp": servos.kp[i], "kv": np.nan_to_num(servos.kd[i])}
+    if np.isfinite(servos.limit[i]):
+        numbers["forcerange"] = [-servos.limit[i], servos.limit[i]]
+    if np.isfinite(servos.low[i]) and np.isfinite(servos.high[i]):
+        numbers["ctrlrange"] = [servos.low[i], servos.high[i]]
+    name, written = _escaped(robot.joint_names[i]), " ".join(f'{k}="{_text(x)}"' for k, x in numbers.items())
+    return f'<position name="{name}" joint="{name}" {written}/>'
 
 
 def _speeds(robot: Robot) -> str:

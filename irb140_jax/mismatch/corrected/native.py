@@ -13,6 +13,7 @@ from irb140_jax.oracle.mujoco import inverse_dynamics_along, oracle_model
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
+from irb140_jax.robot.drive import ServoGains
 
 XML, NOTES = "corrected.xml", "corrected.md"
 
@@ -34,8 +35,17 @@ def native_robot(model: CorrectedModel) -> Robot:
 
 def save_native(model: CorrectedModel, folder: pathlib.Path) -> None:
     """Write the corrected model as MJCF, and a page on what it holds, into an existing folder."""
-    (folder / XML).write_text(robot_mjcf(native_robot(model)), encoding="utf-8")
+    robot = native_robot(model)
+    (folder / XML).write_text(robot_mjcf(robot, servos=_servos(model, robot)), encoding="utf-8")
     (folder / NOTES).write_text(_page(model), encoding="utf-8")
+
+
+def _servos(model: CorrectedModel, native: Robot) -> ServoGains | None:
+    """Servos of the file: with the torque constants found wrong, their gains are those of the torque on the joints."""
+    if model.drive is None:
+        return None
+    d, gear = model.drive, np.asarray(native.gear) / np.asarray(model.robot.gear)
+    return ServoGains(gear * d.kp, gear * d.kd, gear * d.limit, d.low, d.high)
 
 
 def beyond_file(
@@ -76,8 +86,10 @@ def _page(model: CorrectedModel) -> str:
         f"# {XML}: {model.robot.name}, corrected",
         "",
         "The inertial parameters are those refitted together with the findings, or the nearest physically possible",
-        "ones. The file has no visual or collision geometry; copy it from your own model. The control of a motor is",
-        "the torque that the controller commands, so a corrected torque constant is in the gear of that motor.",
+        "ones. The file has no visual or collision geometry; copy it from your own model.",
+        "The control of a motor is the torque that the controller commands, so a corrected torque constant is in the",
+        "gear of that motor." if model.drive is None else "gear of that motor. Where gains are known, joints have "
+        "position servos, controlled by commanded positions; commands that act late are for you to delay.",
     ]
     if not model.named:
         lines += ["", "The diagnosis names no effect, so only inertial parameters differ from the model as given."]

@@ -1,4 +1,4 @@
-"""The three models as MuJoCo simulates them, and the torque that a recording puts on the joints of each."""
+"""The three models as MuJoCo simulates them, and what a recording puts on the joints of each: torque, or commands."""
 
 import copy
 import dataclasses
@@ -13,7 +13,8 @@ from irb140_jax.mismatch.corrected.native import native_robot
 from irb140_jax.mismatch.inertials.consistent import of_bodies_or_nominal
 from irb140_jax.oracle.mujoco import mass_matrix
 from irb140_jax.oracle.rollout import simulated_model
-from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.condition import Commanded, Conditioned
+from irb140_jax.recordings.drive import Drive
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
 
 ENDLESS = 1e5  # [rad/s^2 or m/s^2] faster, no motor turns anything
@@ -43,16 +44,35 @@ class Simulated:
         return most > ENDLESS * lightest
 
     def torque(self, name: str, tau: np.ndarray, missing: np.ndarray) -> np.ndarray:
-        """Torque on the joints of a model, (T, n) [N m or N].
+        """Torque put on the joints of a model beside that of its servos, (T, n) [N m or N].
 
         Args:
             name: Of the model.
-            tau: What was logged, (T, n) [N m or N].
+            tau: What was logged, (T, n) [N m or N]; zero where servos are simulated.
             missing: What of it corrected.xml can't hold, (T, n) [N m or N].
         """
         if name in ("nominal", "refit"):
             return tau
         return (tau if name == FILE else tau - missing) * self.gear
+
+
+    def driven(self, name: str, drive: Drive | None) -> mujoco.MjModel:
+        """A model as a recording drives it: with position servos in the place of its motors where there are any.
+
+        Args:
+            name: Of the model.
+            drive: Of the servos; an unknown gain counts as zero.
+        """
+        if drive is None:
+            return self.compiled[name]
+        out, gear = copy.copy(self.compiled[name]), 1.0 if name in ("nominal", "refit") else self.gear
+        kp, kd, limit = gear * np.nan_to_num(drive.kp), gear * np.nan_to_num(drive.kd), gear * drive.limit
+        out.actuator_gear[:, 0], out.actuator_gainprm[:, 0] = 1.0, kp
+        out.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE
+        out.actuator_biasprm[:, 1], out.actuator_biasprm[:, 2] = -kp, -kd
+        out.actuator_forcelimited[:] = np.isfinite(limit)
+        out.actuator_forcerange[:] = np.stack([-limit, limit], axis=1)
+        return out
 
 
 def simulated(model: CorrectedModel, nominal: mujoco.MjModel, step: float) -> Simulated | None:
@@ -70,6 +90,13 @@ def simulated(model: CorrectedModel, nominal: mujoco.MjModel, step: float) -> Si
         return None
     compiled[FILE] = compiled["corrected"]
     return Simulated(model, {"nominal": nominal} | compiled, np.asarray(corrected.gear) / np.asarray(model.robot.gear))
+
+
+def asked(servo: Commanded) -> np.ndarray:
+    """Controls of those servos: commanded positions, and commanded speeds as positions ahead, shape (T, n)."""
+    kp, kd = servo.drive.kp, servo.drive.kd
+    ahead = np.divide(kd, kp, out=np.zeros_like(kp), where=np.isfinite(kp) & np.isfinite(kd))
+    return servo.command + ahead * servo.asked_speed
 
 
 def led(models: dict[str, mujoco.MjModel], joints: np.ndarray) -> dict[str, mujoco.MjModel]:

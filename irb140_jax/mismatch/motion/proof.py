@@ -1,4 +1,4 @@
-"""Motion error over the horizon: from recorded starts under recorded torque, against where the robot went."""
+"""Motion error over the horizon: from recorded starts under recorded torque or commands, and where the robot went."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -7,9 +7,17 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.mismatch.corrected.model import CorrectedModel
-from irb140_jax.mismatch.motion.models import FILE, Simulated, compiled_robot, leading, led, simulated
+from irb140_jax.mismatch.motion.models import (
+    FILE,
+    Simulated,
+    asked,
+    compiled_robot,
+    leading,
+    led,
+    simulated,
+)
 from irb140_jax.mismatch.motion.sentences import MODELS, sentences, subject
-from irb140_jax.mismatch.motion.windows import FINEST, LONGEST, Span, Window, windows
+from irb140_jax.mismatch.motion.windows import FINEST, FINEST_SERVO, LONGEST, Span, Window, windows
 from irb140_jax.oracle.rollout import positions, tool_positions
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.robot import Robot
@@ -41,14 +49,16 @@ def proof_in_motion(
     if not short:
         return None
     step = float(np.mean([r.t[1] - r.t[0] for r in recordings]))
-    parts = max(1, int(np.ceil(step / FINEST)))
+    drives = [r.servo.drive for r in recordings if r.servo is not None]
+    parts = max(1, int(np.ceil(step / (FINEST_SERVO if drives else FINEST))))
     nominal, ready = compiled_robot(robot, step / parts), {}
     for fold in dict.fromkeys(w.fold for w in (*short, *runs)):
         made = simulated(of_fold(fold), nominal, step / parts)
         if made is None or nominal.nv != robot.n:
             return None
         ready[fold] = made
-    follow = np.any([m.weightless(r) for m in ready.values() for r in recordings], axis=0)
+    weightless = [m.weightless(r) for m in ready.values() for r in recordings]
+    follow = np.any([*weightless, *(np.isnan(d.kp) for d in drives)], axis=0)
     if follow.all():
         return None
     if follow.any():
@@ -56,14 +66,16 @@ def proof_in_motion(
     laws = [n.effect for m in ready.values() for n in m.model.named]
     lacking = list(dict.fromkeys(law.title for law in laws if law.export.not_in_mjcf))
     names = (*MODELS, FILE) if lacking else MODELS
+    logged = [0.0 * r.tau if drives else r.tau for r in recordings]
     applied = lambda name, w: leading(  # noqa: E731
-        ready[w.fold].torque(name, recordings[w.recording].tau, missing[w.recording]), recordings[w.recording], follow
+        ready[w.fold].torque(name, logged[w.recording], missing[w.recording]), recordings[w.recording], follow
     )
     at = _errors(ready, names, applied, recordings, short, parts, np.array(TIMES))
     over = _errors(ready, names, applied, recordings, runs, parts, np.linspace(0.0, LONGEST, 41)[1:]) if runs else {}
     free, units = np.flatnonzero(~follow).tolist(), ["m" if slide else "rad" for slide in robot.is_slide]
     out = {
         "schema": SCHEMA,
+        "driven_by": "commands" if drives else "torque",
         "horizon": list(TIMES),
         "windows": len(short),
         "runs": len(runs),
@@ -88,15 +100,19 @@ def _errors(
     batch = [(w, name) for name in names for w in cut]
     longest = max(w.last - w.first for w in cut)
     n = recordings[0].q.shape[1]
-    tau, start, speed = np.zeros((len(batch), longest * parts, n)), np.zeros((len(batch), n)), np.zeros((len(batch), n))
+    tau, control = np.zeros((2, len(batch), longest * parts, n))
+    start, speed = np.zeros((2, len(batch), n))
     for b, (w, name) in enumerate(batch):
-        r, torque = recordings[w.recording], applied(name, w)
+        r = recordings[w.recording]
         fine = w.first + np.arange((w.last - w.first) * parts) / parts
-        low = np.minimum(fine.astype(int), len(torque) - 2)
-        tau[b, : len(fine)] = torque[low] + (fine - low)[:, None] * (torque[low + 1] - torque[low])
+        tau[b, : len(fine)] = _between(applied(name, w), fine)
+        if r.servo is not None:
+            control[b, : len(fine)] = _between(asked(r.servo), fine)
         start[b] = r.q[w.first]
         speed[b] = r.qd[w.first] - 0.5 * (r.t[1] - r.t[0]) / parts * r.qdd[w.first]
-    went = positions([models[w.fold].compiled[name] for w, name in batch], start, speed, tau)[:, ::parts]
+    servos = [r.servo and r.servo.drive for r in recordings]
+    driven = [models[w.fold].driven(name, servos[w.recording]) for w, name in batch]
+    went = positions(driven, start, speed, tau, control)[:, ::parts]
     true, still, simulated_ = (np.full((len(cut), len(times), n), np.nan) for _ in range(3))
     out = {}
     for first, name in enumerate(names):
@@ -110,6 +126,12 @@ def _errors(
         out[name] = _apart(tool_of, simulated_, true)
     out["moved"] = _apart(tool_of, np.where(np.isnan(true), np.nan, still), true)
     return out
+
+
+def _between(x: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Rows between the rows of x, straight from one to the next."""
+    low = np.minimum(at.astype(int), len(x) - 2)
+    return x[low] + (at - low)[:, None] * (x[low + 1] - x[low])
 
 
 def _apart(model, one: np.ndarray, other: np.ndarray) -> np.ndarray:

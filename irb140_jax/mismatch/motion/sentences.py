@@ -10,7 +10,7 @@ LEAST = 1e-3  # [mm] a tool that moves less is on the axis
 
 def sentences(proof: Mapping[str, Any]) -> list[str]:
     """How far off the models are, until when the comparison means anything, and what was applied as torque."""
-    horizon, (what, row) = proof["horizon"], subject(proof)
+    horizon, (what, row), by_torque = proof["horizon"], subject(proof), proof["driven_by"] == "torque"
     middle = {name: row[name]["median"] for name in (*MODELS, "moved")}
     said = []
     for time in SAID_AT:
@@ -21,16 +21,18 @@ def sentences(proof: Mapping[str, Any]) -> list[str]:
             said.append(f"After {time:g} s {what} is off by {given}; the robot has moved it by {moved} (medians of "
                         f"{proof['windows']} starts).")  # fmt: skip
     if (last := lost(proof)) is not None:
-        said.append(f"From {last:g} s on every model is farther off than {what} has moved: driven by torque alone, "
-                    "without a controller, small errors grow, and there the comparison means nothing.")  # fmt: skip
+        alone = ": driven by torque alone, without a controller, small errors grow, and" if by_torque else ", and"
+        said.append(f"From {last:g} s on every model is farther off than {what} has moved{alone} there the comparison "
+                    "means nothing.")  # fmt: skip
     if (run := proof["whole_run"]) is not None:
         whole = run["tool"] if row is proof["tool"] else run["joints"][what]
         errors, moved = _listed(whole, row["unit"]), _with_unit(whole["moved"], row["unit"])
         said.append(f"Over whole recordings ({run['seconds']:g} s at most) it is off by {errors}; the robot is {moved} "
                     "from its start (medians over time).")  # fmt: skip
     if proof["followed"]:
-        said.append(f"{', '.join(proof['followed'])}: without any inertia in one of the models, so that torque alone "
-                    "can't drive it; in all models it follows the recording.")  # fmt: skip
+        why = "without any inertia in one of the models, so that torque alone can't drive it" if by_torque else (
+            "not driven, for its gains are not known or one of the models has no inertia there")
+        said.append(f"{', '.join(proof['followed'])}: {why}; in all models it follows the recording.")
     if proof["as_torque"]:
         alone = [f"{_with_unit(row['file']['median'][horizon.index(time)], row['unit'])} after {time:g} s"
                  for time in SAID_AT if middle["moved"][horizon.index(time)] is not None]  # fmt: skip

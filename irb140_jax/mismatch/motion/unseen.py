@@ -17,7 +17,7 @@ from irb140_jax.mismatch.validation.held_out import HeldOut, recordings_of_block
 def motion_unseen(
     data: Comparison, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], beyond: Sequence[np.ndarray] | None
 ) -> dict[str, Any] | None:
-    """What motion.json holds; None where a joint's torque was lost or never logged, so that nothing can be simulated.
+    """What motion.json holds; None where a joint's torque was lost, so that nothing can be simulated.
 
     Args:
         data: Model and recordings.
@@ -26,8 +26,8 @@ def motion_unseen(
         loose: Candidates of the refit: inertials wrong beyond their stated uncertainty.
         beyond: What corrected.xml can't hold along each recording, from `beyond_file`; None where unknown.
     """
-    lost = any(r.torque_lost is not None and r.torque_lost.any() for r in data.recordings)
-    if beyond is None or lost or data.servo is not None:
+    lost = any(r.torque_lost is not None and r.torque_lost.any() for r in data.recordings if not r.is_servo_log)
+    if beyond is None or lost:
         return None
     unseen = spans([fold.blocks for fold in proof.folds], recordings_of_blocks(ex), [s.t for s in ex.data.stretches])
 

@@ -7,7 +7,7 @@ import numpy as np
 HORIZON = 2.0  # [s]
 WINDOWS = 24  # over all recordings, evenly spread
 LONGEST = 20.0  # [s] of a whole run
-FINEST = 0.003  # [s] largest time step
+FINEST, FINEST_SERVO = 0.003, 0.001  # [s] largest time step under torque, and of a stiff servo
 MARGIN = 0.1  # [s] at the ends of a recording, where smoothed speeds are worse
 
 
