@@ -16,6 +16,7 @@ PUBLISHED = {
 }  # fmt: skip  # rad
 PUBLISHED_BY_POSITION = 0.0325  # rad, of the same runs, with the duty cycle and numbers fitted to positions
 MODELS = ("nominal", "refit", "corrected")
+FLEW = "flies away | | | |"
 ARM_JOINTS = ("pan", "lift", "elbow", "wrist pitch", "wrist roll")
 ARM_BASELINE = (0.0058, 0.0185, 0.0214, 0.0071, 0.0340)
 SHOWN = {"the same, within what the torque says of it": "the same, load coefficient bounded by the torque"}
@@ -60,9 +61,6 @@ def servo(result: dict) -> list[str]:
     rest = "; ".join(u["where"] for u in result["unexplained"]) or "nothing that repeats"
     return [
         "## A hobby servo with a pendulum (`bam_xl330`)", "",
-        "The figures of this section are stored results of the first statistical engine",
-        "([decisions 30 to 33](decisions/index.md) replaced it); the search of the drive's parameters was not run",
-        "again.", "",
         "The diagnosis uses twelve runs (gains 100, 200 and 800). The four runs with gain 400 are kept for testing.",
         f"From torque alone it names {named(result['findings'])}. It can't name a payload here: the torque of a single",
         "hinge does not depend on the mass of a payload, only on its moments.", "",
@@ -203,7 +201,7 @@ def legs_judged(result: dict) -> list[str]:
         f"calf in {rubbing} of {count}. The smallest viscous coefficient is {min(viscous, default=0.0):.3g} N m s/rad.",
         "Where a delay sits is left open, as the notes of each diagnosis say.",
         *([f"Delays of {min(delays):.0f} to {max(delays):.0f} ms are named in {len(delays)} of {count}.",
-           "That is too long: with the baseline's laws, the error is least at 5 to 20 ms."] if delays else []), "",
+           "With the baseline's laws, the error is least at 5 to 20 ms."] if delays else []), "",
         f"Held-out errors are at most the baseline's on {_listed(met) or 'none'};",
         f"larger on {_listed(missed) or 'none'}. The corrected model errs more than the model as given on",
         f"{_listed(worse) or 'none'}.",
@@ -248,7 +246,7 @@ def arm(result: dict) -> list[str]:
         "Simulated from the commands of the six motions that were kept back, root mean square of the position error",
         "[rad]; the baseline, which came with the data, was fitted to the positions of eight motions:", "",
         f"| model | {' | '.join(ARM_JOINTS)} |", f"|---|{'---|' * len(ARM_JOINTS)}",
-        *(f"| {said} | {' | '.join(f'{x:.4f}' for x in result['arm']['position_rmse'][name])} |"
+        *(f"| {said} | {' | '.join(f'{x:.4f}' for x in result['arm']['position_rmse'][name] or ()) or FLEW} |"
           for name, said in zip(MODELS, ("as given", "inertials refitted", "`corrected.xml`"), strict=True)),
         f"| baseline | {' | '.join(f'{x:.4f}' for x in ARM_BASELINE)} |", "",
     ]  # fmt: skip
