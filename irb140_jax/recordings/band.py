@@ -26,6 +26,13 @@ def choose_band(recordings: list[Recording], robot: Robot) -> Band:
     The positions' spectrum must stand above their noise, and differentiated positions must not fill the model's torque
     with what the logged torque knows nothing of (noise, play, flexibility), for regressors that hold noise bias every
     parameter towards zero.  And what moves a servo must be its command; see `_driven_limit`.
+
+    Args:
+        recordings: At least one, with torque: that of servos is made of their commands.
+        robot: The nominal model.
+
+    Returns:
+        The band [Hz]: its torque cut-off is between `MIN_TORQUE_BAND` and `MAX_TORQUE_BAND` where rates allow that.
     """
     top, rates = [], []
     for recording in recordings:
