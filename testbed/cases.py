@@ -63,6 +63,7 @@ class Case:
         hidden: Kinds that were drawn.
         plant: What was recorded, along motions.
         motions: Those.
+        prescribed: Whether the plant followed them exactly, so that its torque along any path is known.
     """
 
     draw: str
@@ -75,6 +76,7 @@ class Case:
     hidden: tuple[str, ...]
     plant: Plant
     motions: tuple[Motion, ...]
+    prescribed: bool = True
 
 
 def kinds_of(draw: str, index: int, commit: str = "") -> tuple[str, ...]:

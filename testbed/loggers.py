@@ -46,9 +46,17 @@ def random_logger(rng: np.random.Generator, slide: np.ndarray, size: np.ndarray,
     )  # fmt: skip
 
 
+def clock(logger: Logger, rng: np.random.Generator, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """When the rows of a recording are due and when they are taken, by the channels' clock [s], shape (R,) each."""
+    due = np.arange(t[0] + 1.0 / logger.rate, t[-1] - 1.0 / logger.rate, 1.0 / logger.rate)
+    due = due + rng.uniform(0.0, 1.0 / logger.rate)  # no clock starts with another's
+    return due, due + np.clip(logger.jitter * rng.normal(size=len(due)), -0.3, 0.3) / logger.rate
+
+
 def logged(
-    logger: Logger, rng: np.random.Generator, t: np.ndarray, q: np.ndarray, qd: np.ndarray, tau: np.ndarray
-) -> dict[str, np.ndarray]:
+    logger: Logger, rng: np.random.Generator, t: np.ndarray, q: np.ndarray, qd: np.ndarray, tau: np.ndarray,
+    rows: tuple[np.ndarray, np.ndarray] | None = None,
+) -> dict[str, np.ndarray]:  # fmt: skip
     """One recording: t, q, tau, qd where it is logged, and what no file shows: tau_true, and `began`.
 
     `began` is the time by the channels' clock at which the log's is zero.
@@ -57,10 +65,9 @@ def logged(
         logger: Its make.
         rng: Random numbers.
         t, q, qd, tau: Every STEP, as the channels of the controller have them; shapes (T,) and (T, n).
+        rows: What `clock` gave, where that was asked before.
     """
-    due = np.arange(t[0] + 1.0 / logger.rate, t[-1] - 1.0 / logger.rate, 1.0 / logger.rate)
-    due = due + rng.uniform(0.0, 1.0 / logger.rate)  # no clock starts with another's
-    taken = due + np.clip(logger.jitter * rng.normal(size=len(due)), -0.3, 0.3) / logger.rate
+    due, taken = rows or clock(logger, rng, t)
     at = lambda x: np.stack([np.interp(taken, t, c) for c in x.T], axis=1)  # noqa: E731
     positions = at(q) + 0.3 * logger.counts * rng.normal(size=(len(taken), q.shape[1]))
     true = at(tau)

@@ -3,6 +3,7 @@
     python -m testbed.runner work                       # cases 0 to 99 of *work*
     python -m testbed.runner check --count 300          # ... of *check*: every run of it is a look that counts
     python -m testbed.runner final --commit HASH
+    python -m testbed.runner work --servo known         # servos in closed loop, of which gains are known
     python -m testbed.runner work --label new --call irb140_jax.another:diagnose
 
 One JSON line a case is appended to results/testbed_DRAW.jsonl as it is done, so an interrupted run goes on where it
@@ -27,6 +28,7 @@ from scipy import signal
 
 from testbed.cases import Case, Variation, make
 from testbed.plants import torque_along
+from testbed.servos import make_servo
 
 RESULTS = pathlib.Path(__file__).parents[1] / "results"
 KEPT = ("verdict", "findings", "unexplained", "not_testable", "fit", "notes", "summary")
@@ -46,6 +48,8 @@ class Config:
     noise: float = 1.0
     longer: float = 1.0
     error: float | None = None
+    servo: Literal["", "torque", "known", "wrong", "unknown"] = ""
+    """A case of servos in closed loop: what is logged, or known of its gains."""
     call: str = "irb140_jax.mismatch:diagnose"
     """What diagnoses: module:function of a robot and recordings, with a `Result`."""
     engine: str = ""
@@ -87,7 +91,8 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
         out["diagnosis"] = {k: v for k, v in result.diagnosis.to_json().items() if k in KEPT}
         out["sentences"] = [x["sentence"] for x in result.views.to_json()["inertials"] if x["sentence"]]
         out |= _compared(case, result, [mismatch.predict(result.model, r) for r in unseen])
-        out["left_in_band"] = left_by_the_truth(case, robot, recordings, out["band"])
+        if case.prescribed:
+            out["left_in_band"] = left_by_the_truth(case, robot, recordings, out["band"])
     except InputError as error:
         out["refused"] = re.sub(r"\S*/(?=\w+\.\w+)", "", str(error))  # file names, without this machine's folders
     except Exception as error:  # a crash is a result, too
@@ -97,17 +102,18 @@ def judged(case: Case, diagnose: Callable[..., Any] | None = None) -> dict[str, 
 
 def read_case(case: Case, folder: pathlib.Path):
     """The robot, the recordings and those that nobody fits, written to a folder and read as a user's files are."""
-    from irb140_jax.recordings import read_recording
+    from irb140_jax.recordings import drive_of_model, read_recording
     from irb140_jax.robot import load_robot
 
     (folder / "model.xml").write_text(case.xml, encoding="utf-8")
     robot, read = load_robot(folder / "model.xml"), []
+    drive = drive_of_model(folder / "model.xml", robot.joint_names)
     for i, r in enumerate([*case.recordings, *case.held_out]):
         path = folder / f"{'recording' if i < len(case.recordings) else 'unseen'}{i}.npz"
-        columns = {f"{k}.{name}": r[k][:, j] for k in ("q", "qd", "tau") if k in r
+        columns = {f"{k}.{name}": r[k][:, j] for k in ("q", "qd", "tau", "qdes") if k in r
                    for j, name in enumerate(case.joint_names)}  # fmt: skip
         np.savez(path, allow_pickle=False, t=r["t"], **columns)
-        read.append(read_recording(path, robot))
+        read.append(read_recording(path, robot, drive=drive))
     return robot, read[: len(case.recordings)], read[len(case.recordings) :]
 
 
@@ -120,10 +126,11 @@ def _compared(case: Case, result: Any, torques: list[dict[str, np.ndarray]]) -> 
         off = [(tau[which] - r["tau_true"])[_inner(r["t"])] for tau, r in zip(torques, case.held_out, strict=True)]
         unseen[which] = rms(np.concatenate(off))
     band = getattr(getattr(model, "band", None), "torque", None)
-    noise = np.concatenate([low_passed(r["tau"] - r["tau_true"], r["t"], band) for r in case.recordings])
+    noise = [low_passed(r["tau"] - r["tau_true"], r["t"], band) for r in case.recordings if "tau" in r]
     bodies = {k: np.asarray(getattr(model, f"phi_{k}")) for k in ("refit", "corrected") if hasattr(model, f"phi_{k}")}
     impossible = {k: [names[j] for j, p in enumerate(v) if not possible(p)] for k, v in bodies.items()}
-    return {"unseen": unseen, "band": band, "noise_in_band": rms(noise), "impossible": impossible}
+    known = {"noise_in_band": rms(np.concatenate(noise))} if noise else {}
+    return {"unseen": unseen, "band": band, "impossible": impossible} | known
 
 
 def left_by_the_truth(case: Case, robot: Any, recordings: list[Any], band: float) -> dict[str, float]:
@@ -195,15 +202,20 @@ def main() -> None:
     config.out.mkdir(parents=True, exist_ok=True)
     module, _, function = config.call.partition(":")
     diagnose = getattr(importlib.import_module(module), function)
-    path = stored(config.draw, config.label, config.out)
+    label = "_".join(x for x in (config.servo and f"servo_{config.servo}", config.label) if x)
+    path = stored(config.draw, label, config.out)
     done = {r["index"] for r in read(path)}
     for index in range(config.count):
         if config.until and time.strftime("%H:%M") >= config.until:
             break
         if index in done:
             continue
-        vary = Variation(config.noise, config.longer, config.error)
-        out = {**judged(make(config.draw, index, config.commit, vary), diagnose), "engine": config.engine}
+        if config.servo:
+            case = make_servo(config.draw, index, config.servo, config.commit)
+        else:
+            vary = Variation(config.noise, config.longer, config.error)
+            case = make(config.draw, index, config.commit, vary)
+        out = {**judged(case, diagnose), "engine": config.engine}
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(compact(out)) + "\n")
         said = out["diagnosis"]["verdict"] if out["diagnosis"] else out.get("refused") or out["failed"]

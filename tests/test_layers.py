@@ -167,10 +167,10 @@ def test_the_testbed_is_made_by_nothing_that_it_judges():
     assert calling == {"runner.py"}
 
 
-def test_the_testbed_takes_no_dynamics_and_no_friction_from_mujoco():
-    # It compiles a model's text in one place, and that is all.
+def test_plants_on_prescribed_paths_take_no_dynamics_and_no_friction_from_mujoco():
+    # It compiles a model's text in one place, and closes the loop of servos in another, and that is all.
     using = {path.name for path in TESTBED if "mujoco" in outside_imports(path)}
-    assert using == {"arms.py"}
+    assert using == {"arms.py", "servos.py"}
     assert "mj_" not in (PACKAGE.parent / "testbed" / "arms.py").read_text(encoding="utf-8")
 
 

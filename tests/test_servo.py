@@ -22,6 +22,8 @@ from irb140_jax.recordings import drive_of_model, read_recording, stated_drive, 
 from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.servo import with_servo_torques, with_torque
 from irb140_jax.report import html_report
+from testbed.runner import read_case
+from testbed.servos import make_servo
 
 STATED = stated_drive(np.array(KP), np.array(KD))
 # Compiling the whole library takes most of a minute; these are what a servo's errors might be taken for.
@@ -102,6 +104,14 @@ def test_a_delay_of_all_commands_is_found_and_its_place_left_open(robot):
     assert any("can't be told from the fit" in note for note in notes)
 
 
+def test_commands_that_are_held_from_row_to_row_act_half_a_row_late(tmp_path):
+    case = make_servo("work", 9, "known")  # 100 rows a second, with friction on every joint
+    robot, recordings, _ = read_case(case, tmp_path)
+    made, _ = with_servo_torques(recordings, robot, 0.05)
+    drive = drive_of(made[0])
+    np.testing.assert_allclose(drive.delay, 0.005, atol=1e-3)
+
+
 def test_logs_of_torque_and_of_commands_are_not_mixed(robot):
     recording, torque = closed_loop(two_links(), duration=3.0)
     with pytest.raises(RecordingError, match="give recordings of one kind"):
@@ -146,6 +156,12 @@ def test_the_comparison_ends_where_more_of_the_motion_is_pushed_than_commanded(n
     bands = [choose_band(with_servo_torques([r], nominal_leg, 0.05)[0], nominal_leg).torque for r in (pushed, alone)]
     np.testing.assert_allclose(bands[0], min(even), atol=3.0)  # of spectra that resolve 1 Hz
     assert bands[1] == 20.0  # as wide as any
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_pushes_that_no_command_knows_of_make_no_command_late(nominal_leg, seed):
+    drive = drive_of(with_servo_torques([pushed_leg(0.4, seed)], nominal_leg, 0.05)[0][0])
+    assert not drive.delay.any()  # least squares without instruments: 11 ms, and four times its error
 
 
 def test_what_pushes_a_servo_is_not_taken_for_a_delay_of_its_torque(nominal_leg):

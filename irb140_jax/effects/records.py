@@ -115,11 +115,13 @@ class Place:
         at: Where on the way from the motor to the log.
         sites: Groups of joints at which it can act, (sites, m).
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
+        of_clocks: It is an error of the torque channel's clock: torque made of commands and positions has none.
     """
 
     at: At = At.LINKS
     sites: Callable[[Robot], np.ndarray] = each_joint
     everywhere: bool = False
+    of_clocks: bool = False
 
     @property
     def is_friction(self) -> bool:

@@ -136,7 +136,8 @@ def _explained(
 ) -> Explanation:
     """What the model leaves out, with one scale of all torques where that is probable."""
     scatter, uncertainty = np.hypot(*sensors), config.inertial_uncertainty
-    ex = explain(data.robot, data.smooth, data.band, config.effects, uncertainty, scatter, progress, unproved)
+    effects = [e for e in config.effects if data.servo is None or not e.place.of_clocks]
+    ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved)
     ex = without_negligible(ex, data.servo)
     return dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= settings.NAMED)
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import interpolate, ndimage
 
 from irb140_jax.recordings.direction import REST, direction_of
-from irb140_jax.recordings.drive import DELAY_WIDTH, ROWS_WIDTH, Drive
+from irb140_jax.recordings.drive import OWN_DELAY_WIDTH, ROWS_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.servo import taken_up
@@ -32,14 +32,14 @@ class Commanded:
         command: Commanded positions when they are taken up [rad or m], shape (T, n).
         command_rate: Derivative of the commanded positions, anti-aliased as the torque [rad/s or m/s], shape (T, n).
         asked_speed: Commanded speeds [rad/s or m/s], shape (T, n).
-        delay_width: Standard deviation of the time at which commands are taken up [s].
+        own_delay_width: Standard deviation of the time at which those of one joint are taken up beside all others' [s].
     """
 
     drive: Drive
     command: np.ndarray
     command_rate: np.ndarray
     asked_speed: np.ndarray
-    delay_width: float
+    own_delay_width: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,13 +161,13 @@ def _commanded(
     """The commands through the filters that the torque passes, or None where there are none."""
     if recording.qdes is None or recording.drive is None:
         return None
-    wanted = filtered(_at(t, recording.t, recording.qdes), anti_alias)
+    command = taken_up(recording, recording.drive)
+    wanted = filtered(_at(t, recording.t, command), anti_alias)
     rate = np.gradient(wanted, t, axis=0)
     speed = np.zeros_like(wanted) if recording.qddes is None else filtered(
         _at(t, recording.t, recording.qddes), anti_alias)  # fmt: skip
-    width = max(DELAY_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
-    command = _at(grid, recording.t, taken_up(recording, recording.drive))
-    return Commanded(recording.drive, command, _at(grid, t, rate), _at(grid, t, speed), width)
+    width = max(OWN_DELAY_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
+    return Commanded(recording.drive, _at(grid, recording.t, command), _at(grid, t, rate), _at(grid, t, speed), width)
 
 
 def _lost_torque(recording: Recording, grid: np.ndarray, reach: int) -> np.ndarray:

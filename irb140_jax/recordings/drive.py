@@ -13,7 +13,7 @@ from irb140_jax.robot import servos_of
 KP_WIDTH, KD_WIDTH = 0.10, 0.05  # relative standard deviation of a stated Kp and Kd
 # s and rows by which commands of one joint may act at another time than those of all joints are found to.  Not more:
 # what is explained by a delay that no model holds is missing when the model predicts.
-DELAY_WIDTH, ROWS_WIDTH = 1e-3, 0.1
+OWN_DELAY_WIDTH, ROWS_WIDTH = 1e-3, 0.1
 SECTIONS = ("kp", "kd", "torque_limit", "command_delay")  # of the column map
 
 

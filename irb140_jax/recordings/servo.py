@@ -21,9 +21,9 @@ from irb140_jax.robot import Robot
 AT_LIMIT = 0.98  # of the torque limit: from here on a row is left out
 KNOWN = 0.5  # relative standard deviation up to which an estimated Kp gives torque at all
 DELAYED = (
-    "Commands are taken to act {:.3g} +- {:.2g} ms after their row on all joints alike: so the model and friction "
-    "explain the torque best. Whether the command is taken up late, the drive's torque lags, or the clocks are out of "
-    "step can't be told from the fit; state [command_delay] in the map if it is known."
+    "Commands are taken to act {:.3g} +- {:.2g} ms after their row on all joints alike: so the model with usual "
+    "friction explains the torque best. Whether commands are held from row to row or taken up late, the drive's torque "
+    "lags, or the clocks are out of step can't be told from the fit; state [command_delay] in the map if it is known."
 )
 LEAST_KD_WIDTH = 0.5  # of an estimated Kd, which holds the joint's own viscous friction
 
@@ -53,7 +53,7 @@ def with_servo_torques(
                              "torque; give recordings of one kind")
     drives = [r.drive or unknown_drive(robot.n) for r in servos]
     unstated = not any(d.delay.any() for d in drives)
-    delay, spread = estimated_delay(servos, drives, robot) if unstated else (0.0, 0.0)
+    delay, spread = estimated_delay(servos, drives, robot, uncertainty) if unstated else (0.0, 0.0)
     rows = rows_of_joints(servos, drives, robot, (delay,))
     estimates: dict[int, Estimate] = {}
     for j in range(robot.n):

@@ -2,7 +2,8 @@
 
     Kp (qdes(t - delay) - q) = m + Fc sign(qd) + (Kd + Fv) qd + J qdd + c
 
-m is the torque of the nominal model; none of Kp, Fc, Kd + Fv and J is negative.
+m is the torque of the nominal model; none of Kp, Fc, Kd + Fv and J is negative.  The delay is found first, with what is
+known of Kd and of friction beforehand, and from that part of the motion which goes with the command.
 """
 
 import dataclasses
@@ -12,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from irb140_jax.recordings.drive import Drive
+from irb140_jax.recordings.drive import KD_WIDTH, KP_WIDTH, Drive
 from irb140_jax.recordings.glance import glance
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.torques import nominal_torques
@@ -21,9 +22,14 @@ from irb140_jax.robot import Robot
 MOVING = 0.03  # of a joint's top speed: slower rows say nothing of the direction of friction
 FAR_FROM_LIMIT = 0.9  # of the torque limit, from which smoothed rows hold some that the limit cut
 PIECES = 8  # of all recordings, one of which at a time is left out to know how sure an estimate is
-LONGEST, COARSE, FINE = 0.12, 5e-3, 2.5e-4  # s: delays that are tried, first in coarse steps, then in fine ones
-CLEAR = 3.0  # standard deviations from which a delay is one, ...
-WORTH = 0.05  # ... and share of the error that it takes off
+LONGEST, COARSE, FINE = 0.12, 5e-3, 5e-4  # s: delays that are tried, first in coarse steps, then in fine ones
+BEFORE = np.arange(-0.02, 0.2, 0.01)  # s before a row at which commands are looked at
+CLEAR = 3.0  # standard deviations from which a delay is one
+# Shares of a joint's torque: standard deviations of what dry and viscous friction, a rotor and an offset that the model
+# lacks take, and what is left beside them.  On light legs a rotor is nearly all that a motor moves.
+LACKING, LEFT = (0.3, 0.3, 1.0, 0.3), 0.03
+NONNEGATIVE = 3  # how many of them can't be negative
+SETTLED = 5  # rounds in which noise and fit agree
 
 
 class Estimate(NamedTuple):
@@ -44,13 +50,16 @@ class Rows(NamedTuple):
         model: Torque of the nominal model, shape (R,).
         other: Speed, its sign, acceleration, and a constant of either sign, shape (R, 5).
         error: Position error for each delay that is tried, beyond what is stated, shape (delays, R).
-        kp: Stated gain, NaN where none is, shape (R,).
+        command: What the joint was told at each of `BEFORE`, smoothed alike, shape (times, R).
+        kp, kd: Stated gains, NaN where none are, shape (R,).
     """
 
     model: np.ndarray
     other: np.ndarray
     error: np.ndarray
+    command: np.ndarray
     kp: np.ndarray
+    kd: np.ndarray
 
 
 def rows_of_joints(
@@ -61,7 +70,8 @@ def rows_of_joints(
     for r, d in zip(servos, drives, strict=True):
         seen = glance(r)
         total = nominal_torques(robot, seen.q, seen.qd, seen.qdd).total
-        late = [glance(dataclasses.replace(r, tau=_later(r, d, x))).tau - seen.q for x in delays]
+        smooth = lambda x, r=r, d=d: glance(dataclasses.replace(r, tau=_later(r, d, x))).tau  # noqa: E731
+        late, told = [smooth(x) - seen.q for x in delays], [smooth(x) for x in BEFORE]
         for j in range(robot.n):
             qd = seen.qd[:, j]
             asked = np.nan_to_num(d.kp[j]) * np.abs(late[0][:, j])
@@ -69,7 +79,9 @@ def rows_of_joints(
             slow, one = 0.02 * np.abs(qd).max() + 1e-12, np.ones_like(qd)
             other = np.stack([qd, np.tanh(qd / slow), seen.qdd[:, j], one, -one], axis=1)
             error = np.stack([x[use, j] for x in late])
-            parts[j].append(Rows(total[use, j], other[use], error, np.full(int(use.sum()), d.kp[j])))
+            gains = np.full((2, int(use.sum())), [[d.kp[j]], [d.kd[j]]])
+            before = np.stack([x[use, j] for x in told])
+            parts[j].append(Rows(total[use, j], other[use], error, before, *gains))
     return [_joined(joint) for joint in parts]
 
 
@@ -79,7 +91,9 @@ def _joined(parts: Sequence[Rows]) -> Rows:
         model=np.concatenate([part.model for part in parts]),
         other=np.concatenate([part.other for part in parts]),
         error=np.concatenate([part.error for part in parts], axis=1),
+        command=np.concatenate([part.command for part in parts], axis=1),
         kp=np.concatenate([part.kp for part in parts]),
+        kd=np.concatenate([part.kd for part in parts]),
     )
 
 
@@ -88,34 +102,81 @@ def _later(r: Recording, d: Drive, delay: float) -> np.ndarray:
     return np.stack([np.interp(r.t - delay - x, r.t, w) for x, w in zip(d.delay, wanted.T, strict=True)], axis=1)
 
 
-def estimated_delay(servos: Sequence[Recording], drives: Sequence[Drive], robot: Robot) -> tuple[float, float]:
-    """Delay of all commands alike beyond what is stated, and its standard deviation [s]; 0 where there is none.
+def estimated_delay(
+    servos: Sequence[Recording], drives: Sequence[Drive], robot: Robot, uncertainty: float
+) -> tuple[float, float]:
+    """Delay of all commands alike beyond what is stated, and its standard deviation [s]; 0 where none is clear.
 
-    What is left of each joint counts by the least that is left of it, so that strong joints don't decide alone.
+    On slow motion a late command looks like viscous friction, Kp times the delay of it at every joint.  So what is
+    known beforehand decides: how well Kd is known, how large friction usually is, and that the delay is one.
+
+    Args:
+        servos: Logs of commands.
+        drives: What is stated of the servos, one a log.
+        robot: The nominal model.
+        uncertainty: Relative standard deviation of its inertials.
     """
+    def log_evidence(delays: np.ndarray) -> np.ndarray:
+        rows = rows_of_joints(servos, drives, robot, delays.tolist())
+        return np.sum([_log_evidence(r, uncertainty) for r in rows], axis=0)
+
     coarse = np.arange(0.0, LONGEST, COARSE)
-    first, *_ = _best(rows_of_joints(servos, drives, robot, coarse.tolist()), coarse)
-    fine = np.concatenate([[0.0], np.arange(max(first[0] - COARSE, FINE), first[0] + COARSE, FINE)])
-    best, gain = _best(rows_of_joints(servos, drives, robot, fine.tolist()), fine)
-    spread = float(np.hypot(np.sqrt((PIECES - 1) / PIECES * np.sum((best[1:] - best[1:].mean()) ** 2)), FINE))
-    clear = best[0] > CLEAR * spread and gain > WORTH
-    return (float(best[0]), spread) if clear else (0.0, 0.0)
+    first = coarse[np.argmax(log_evidence(coarse))]
+    fine = np.arange(max(first - COARSE, 0.0), first + COARSE + 0.5 * FINE, FINE)
+    odds = log_evidence(fine)
+    best, weight = fine[np.argmax(odds)], np.exp(odds - odds.max())
+    spread = float(max(np.sqrt(weight @ (fine - best) ** 2 / weight.sum()), FINE))
+    return (float(best), spread) if best > CLEAR * spread else (0.0, 0.0)
 
 
-def _best(rows: Sequence[Rows], delays: np.ndarray) -> tuple[np.ndarray, float]:
-    """The best of these delays with all rows and without each piece, and the share of the error that it takes off."""
-    left = np.array([[[_left(r, k, piece) for k in range(len(delays))] for r in rows]
-                     for piece in (None, *range(PIECES))])  # fmt: skip
-    best = np.argmin(np.sum(left / left.min(axis=2, keepdims=True), axis=1), axis=1)
-    return delays[best], 1.0 - float(np.exp(0.5 * np.mean(np.log(left[0, :, best[0]] / left[0, :, 0]))))
+def _log_evidence(rows: Rows, uncertainty: float) -> np.ndarray:
+    """Log evidence of one joint's rows at every delay by Laplace's approximation, shape (delays,).
+
+    Friction and a rotor are none below zero: without that, a delay has no lower side.  What is left is a function of
+    the joint's state, so it is as often independent as the joint turns round.
+    """
+    kp, kd, kp_width, kd_width = rows.kp, rows.kd, KP_WIDTH, KD_WIDTH * np.nan_to_num(rows.kd)
+    vague = bool(np.isnan(kd).any())  # then what goes with speed is no measure of the joint's torque
+    if np.isnan(kp).any() or np.isnan(kd).any():
+        found = estimated_gains(rows)
+        # With the joint's viscous friction, and with what a late command adds.
+        kd, kd_width = np.where(np.isnan(kd), found.kd, kd), np.where(np.isnan(kd), 0.5 * found.kd, kd_width)
+        kp, kp_width = np.where(np.isnan(kp), found.kp, kp), found.spread if np.isnan(kp).any() else kp_width
+    if not np.isfinite(kp).all() or not len(kp):
+        return np.zeros(len(rows.error))
+    qd, turned, qdd, one, _ = rows.other.T
+    size = lambda x: float(np.sqrt(np.mean(x**2))) + 1e-300  # noqa: E731
+    lacking = np.stack([share * x / size(x) for share, x in zip(LACKING, (turned, qd, qdd, one), strict=True)], axis=1)
+    known = np.stack([np.hypot(uncertainty, kp_width) * rows.model, kd_width * qd], axis=1)
+    turns = 1.0 + np.count_nonzero(np.diff(np.sign(qd)))
+    asked = _instruments(rows)
+    out = []
+    for error in rows.error:
+        given = kp * error - kd * qd
+        torque, y = size(given - vague * qd * (qd @ given) / (qd @ qd + 1e-300)), given - rows.model
+        X = asked.T @ np.column_stack([torque * lacking, known, y]) * np.sqrt(turns / len(y))
+        R = np.asarray(np.linalg.qr(X, mode="r"))
+        A, z, least = R[:, :-1], R[:, -1], (LEFT * torque) ** 2
+        signed = np.concatenate([A, -A[:, NONNEGATIVE:]], axis=1)  # friction and rotors are none below zero
+        noise = least
+        for _ in range(SETTLED):  # noise that the rows themselves ask for, beside what is usual
+            both = np.concatenate([signed, np.sqrt(noise) * np.eye(signed.shape[1])])
+            w, off = nnls(both, np.concatenate([z, np.zeros(signed.shape[1])]))
+            left = float(np.sum((z - signed @ w) ** 2))
+            loss, noise = off**2 / noise, max(least, left / turns)
+        out.append(-0.5 * (np.linalg.slogdet(np.eye(A.shape[1]) + A.T @ A / noise)[1] + loss + turns * np.log(noise)))
+    return np.array(out)
 
 
-def _left(rows: Rows, delay: int, piece: int | None) -> float:
-    """Share of the power that a fit at one of the delays leaves, without one piece of the rows."""
-    keep = _kept(len(rows.model), piece)
-    X, y = _system(rows, delay)
-    w = _fitted(X[keep], y[keep])
-    return float(np.mean((y[keep] - X[keep] @ w) ** 2) / np.mean(y[keep] ** 2)) + 1e-9
+def _instruments(rows: Rows) -> np.ndarray:
+    """Orthonormal functions of one joint's command at several times before, shape (R, k).
+
+    What pushes the joint is in its motion and in its position error, and no command knows of it: only what goes with
+    the command tells of the servo (two-stage least squares; Gilson and Van den Hof, Automatica 41(2), 2005).
+    """
+    steps = np.diff(rows.command, axis=0)
+    turned = np.tanh(steps[::4] / (0.02 * np.abs(steps).max() + 1e-300))
+    return np.linalg.qr(np.concatenate([np.ones((1, rows.command.shape[1])), rows.command, turned]).T)[0]
 
 
 def estimated_gains(rows: Rows) -> Estimate:

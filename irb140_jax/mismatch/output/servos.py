@@ -19,7 +19,6 @@ from irb140_jax.robot import Robot
 
 COMMAND_DELAY = len(FIXED) + NAMES.index("command")
 DRIVE_KD = len(FIXED) + NAMES.index("kd")
-LAGS = ("actuator_lag", "time_delay", "channel_skew")  # effects that a late command can't be told from
 
 
 def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
@@ -95,7 +94,7 @@ def of_servos(ex: Explanation, servo: Commanded | None, found: list[Finding]) ->
             )
         elif f.effect == "torque_gain":
             said = " On a servo this means that the stated Kp is wrong, or that the masses of the model are."
-        elif f.effect in LAGS:
+        elif f.effect == "actuator_lag":
             said = (
                 " The fit can't tell its cause: the drive may apply commands late, its torque may lag, or the clocks "
                 "may be out of step."
@@ -119,8 +118,8 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     for j in range(ex.lib.robot.n):
         own, spread = _own_nuisance(ex, j, COMMAND_DELAY)
         odds = log_odds_of_any(own, spread, 1.0) + np.log(settings.RARE)
-        if odds > 0.0 and abs(servo.delay_width * own) > settings.NOTABLE_DELAY:
-            late, width = 1e3 * servo.delay_width * own, 1e3 * servo.delay_width * spread
+        if odds > 0.0 and abs(servo.own_delay_width * own) > settings.NOTABLE_DELAY:
+            late, width = 1e3 * servo.own_delay_width * own, 1e3 * servo.own_delay_width * spread
             way = "late" if own > 0 else "early"
             out.append(
                 f"Commands of {ex.lib.robot.joint_names[j]} act {digits(abs(late))} +- {digits(width, 1)} ms {way}; "

@@ -21,7 +21,7 @@ def servo_columns(motion: Conditioned, j: int) -> np.ndarray:
     if servo is None:
         return np.zeros((len(motion.t), 0))
     damping = servo.drive.kd_width[j] * (motion.qd[:, j] - servo.asked_speed[:, j])
-    late = servo.delay_width * np.nan_to_num(servo.drive.kp[j]) * servo.command_rate[:, j]
+    late = servo.own_delay_width * np.nan_to_num(servo.drive.kp[j]) * servo.command_rate[:, j]
     return np.stack([damping, late], axis=1)
 
 
