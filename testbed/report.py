@@ -19,6 +19,9 @@ ROOT = pathlib.Path(__file__).parents[1]
 LOOKS = ("first", "second", "third", "", "fifth", "sixth")  # labels of the looks at *check*
 # Labels of *check* under other conditions, as `testbed.runner` makes them.
 CONDITIONS = {"quiet": "noise and steps of the sensors / 10", "long": "recordings 10 times as long"}
+# Forms of cases of servos in closed loop: what is logged, or known of their gains.
+SERVOS = {"torque": "torque", "known": "commands; gains known", "wrong": "commands; gains about 10 % wrong",
+          "unknown": "commands; gains unknown"}  # fmt: skip
 LEVELS = (0.5, 0.9, 0.99)
 WAYS = ("named", "in the class", "not testable", "unexplained", "missed")
 PLACES = ("located", "named alike", "noted", "not said")
@@ -123,6 +126,21 @@ def in_rows(what: str, runs: dict[str, Lines]) -> str:
     return markdown(head, rows)
 
 
+def in_closed_loop(forms: dict[str, Lines]) -> str:
+    """Cases of servos, a row for each form in which they were logged."""
+    rows = []
+    for form, every in forms.items():
+        lines = [x for x in every if x["diagnosis"]]
+        wrong = [len(scoring.false_names(x)) for x in lines]
+        rows.append((
+            form, engines(every), f"{len(lines)} of {len(every)}", f"{np.mean(wrong):.2f}",
+            counted([c["size"] > 0 for x in lines for c in scoring.stated_classes(x) if c["slug"]]),
+            counted([not x["diagnosis"]["findings"] for x in lines if not x["truth"]["hidden"]]),
+        ))  # fmt: skip
+    return markdown(("logged", "engine at commit", "cases diagnosed", "false names a case",
+                     "true effect in the stated class", "nothing named where nothing is hidden"), rows)  # fmt: skip
+
+
 def tally(lines: Lines, of: Callable[[dict[str, Any]], list[tuple[str, str]]], ways: tuple[str, ...]) -> Rows:
     """How often each kind came out in which way."""
     by = collections.defaultdict(collections.Counter)
@@ -216,6 +234,8 @@ def main() -> None:
     looks = [look for look in (runner.read(runner.stored("check", label)) for label in LOOKS) if look]
     conditions = {said: runner.read(runner.stored("check", label)) for label, said in CONDITIONS.items()}
     conditions = {said: every for said, every in conditions.items() if any(x["diagnosis"] for x in every)}
+    servos = {said: runner.read(runner.stored("check", f"servo_{form}")) for form, said in SERVOS.items()}
+    servos = {said: every for said, every in servos.items() if any(x["diagnosis"] for x in every)}
     draws = {"final": runner.read(runner.stored("final")), "check": looks[-1]}
     draws = {name: every for name, every in draws.items() if any(x["diagnosis"] for x in every)}
     for name, every in draws.items():
@@ -230,6 +250,7 @@ def main() -> None:
         mixture=", ".join(f"{n} {name}" if n > 1 else name for name, n in many.items()),
         looks=in_rows("look at *check*", {str(number): every for number, every in enumerate(looks, 1)}),
         conditions=in_rows("cases of *check* with", conditions) if conditions else "",
+        servos=in_closed_loop(servos) if servos else "",
         draws=[section(name, every, runner.read(runner.stored(name, "first"))) for name, every in draws.items()],
         probes=markdown(head, [probe_row(x) for x in probes]) if probes else "", probes_engine=engines(probes),
         narrower=narrower(probes),

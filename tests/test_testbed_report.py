@@ -30,6 +30,11 @@ def test_a_section_holds_the_figures_of_its_cases():
     assert "payload on a, b | 0.7 |" in section["false"] and section["others"] == ["4 (torque_gain): KeyError: x"]
 
 
+def test_cases_of_servos_are_a_row_for_each_form():
+    said = report.in_closed_loop({"torque": two_cases()})
+    assert "| torque | abc | 1 of 2 | 1.00 | 1 of 1: 100.0 % (21 to 100) | none |" in said
+
+
 def test_the_figure_is_the_same_for_the_same_results(tmp_path):
     for name in ("one.svg", "two.svg"):
         diagram.draw(two_cases()[:1], tmp_path / name)
