@@ -6,6 +6,7 @@ python experiments/real_machines_page.py [--results results]
 import dataclasses
 import json
 import pathlib
+import re
 
 import tyro
 
@@ -182,8 +183,9 @@ def legs_judged(result: dict) -> list[str]:
             for f in one["findings"]:
                 if f["effect"] == "rotor_inertia" and f["joints"][0].endswith("calf_joint"):
                     rotors.append(f["parameters"]["inertia"])
-                delays += [1e3 * f["parameters"]["delay"]["value"]] if f["effect"] == "time_delay" else []
                 viscous += [p["value"] for name, p in f["parameters"].items() if name == "viscous"]
+            late = (re.match(r"Commands are taken to act ([\d.]+)", note) for note in one["notes"])
+            delays += [float(x[1]) for x in late if x]
             rubbing += any("friction" in f["effect"] or "hysteresis" in f["effect"] for f in one["findings"]
                            if f["joints"][-1].endswith("calf_joint"))  # fmt: skip
     met, missed, worse = [], [], []
@@ -200,7 +202,7 @@ def legs_judged(result: dict) -> list[str]:
         "standard deviations) that meets 0.031 to 0.039 kg m². Dry friction or a law that holds it is named on the",
         f"calf in {rubbing} of {count}. The smallest viscous coefficient is {min(viscous, default=0.0):.3g} N m s/rad.",
         "Where a delay sits is left open, as the notes of each diagnosis say.",
-        *([f"Delays of {min(delays):.0f} to {max(delays):.0f} ms are named in {len(delays)} of {count}.",
+        *([f"Commands are found to act late in {len(delays)} of {count}, by {min(delays):.1f} to {max(delays):.1f} ms.",
            "With the baseline's laws, the error is least at 5 to 20 ms."] if delays else []), "",
         f"Held-out errors are at most the baseline's on {_listed(met) or 'none'};",
         f"larger on {_listed(missed) or 'none'}. The corrected model errs more than the model as given on",
