@@ -4,8 +4,7 @@ Four zero-mean blocks of features a joint, each with a size of its own: what dep
 depends on speed alone, what depends on several of position, speed, direction and load, and what friction may do
 differently around a change of direction, by bristles or lateness.  None holds a term that a named effect consists of
 (a constant, the direction itself, position, speed, acceleration, load): the discrepancy stands for what no law
-explains, not for the laws.  Rates of load and acceleration are such terms of late torque: they are left out where
-torque was logged, and stay where it is made by a servo's law, which has no effect for that.
+explains, not for the laws.
 
 Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(3), 2001; the low rank as in Rasmussen
 and Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
@@ -22,7 +21,6 @@ from irb140_jax.recordings.condition import Conditioned
 
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
-SLOPES = 2  # last features of the last block: rates of the load and of the acceleration
 FEATURES = 82  # of all blocks
 
 

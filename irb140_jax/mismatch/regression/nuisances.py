@@ -8,7 +8,7 @@ import numpy as np
 from irb140_jax.effects import Scales
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Prepared
-from irb140_jax.mismatch.regression.discrepancy import SLOPES, features
+from irb140_jax.mismatch.regression.discrepancy import features
 from irb140_jax.mismatch.regression.servo import scale_width, servo_columns
 from irb140_jax.mismatch.regression.tangent import Point, delayed, late
 from irb140_jax.recordings.low_pass import Band
@@ -94,10 +94,7 @@ def nuisances(
             own = (np.arange(count) == r) - 1.0 / count if count > 1 else np.zeros(0)
             fast = motion.qd[:, [j]] / scales.speed[j]
             slope = np.concatenate([motion.direction[:, [j]] * own, fast * own], axis=1)
-            *blocks, reversal = features(motion, load, scales, j)
-            if motion.servo is None:
-                reversal[:, -SLOPES:] = 0.0
-            scaled = [late(at, x, np.full(x.shape[1], j), dt) for x in (*blocks, reversal, slope)]
+            scaled = [late(at, x, np.full(x.shape[1], j), dt) for x in (*features(motion, load, scales, j), slope)]
             joints.append([band.apply(b) for b in (fixed, *scaled)])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
