@@ -10,7 +10,8 @@ from testbed.motions import STEP
 from testbed.plants import Hidden, Plant, Sizes, on
 
 STILL = 0.003  # of a joint's usual speed, within which dry friction without a step changes its sign
-ORDINARY = ("coulomb_friction", "viscous_friction")
+SHARES = {"coulomb_friction": (0.05, 0.2), "viscous_friction": (0.03, 0.15)}  # of a joint's torque, where ordinary
+ORDINARY = tuple(SHARES)
 
 
 def coulomb(plant: Plant, sizes: Sizes, rng: np.random.Generator, j: int, torque: float, role: str = "special"):
@@ -166,7 +167,7 @@ def hide(plant: Plant, kind: str, slug: str | None, j: int, parameters: dict[str
 
 def rubbed(plant: Plant, sizes: Sizes, rng: np.random.Generator) -> None:
     """Ordinary friction on every joint where nothing stands for it."""
-    for slug, law, low, high in (("coulomb_friction", coulomb, 0.05, 0.2), ("viscous_friction", viscous, 0.03, 0.15)):
+    for (slug, (low, high)), law in zip(SHARES.items(), (coulomb, viscous), strict=True):
         for j in range(plant.arm.n):
             share = rng.uniform(low, high)
             if j not in plant.taken.get(slug, ()):

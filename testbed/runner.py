@@ -28,7 +28,7 @@ from scipy import signal
 
 from testbed.cases import Case, Variation, make
 from testbed.plants import torque_along
-from testbed.servos import make_servo
+from testbed.servos import Form, make_servo
 
 RESULTS = pathlib.Path(__file__).parents[1] / "results"
 KEPT = ("verdict", "findings", "unexplained", "not_testable", "fit", "notes", "summary")
@@ -48,7 +48,7 @@ class Config:
     noise: float = 1.0
     longer: float = 1.0
     error: float | None = None
-    servo: Literal["", "torque", "known", "wrong", "unknown"] = ""
+    servo: Form | None = None
     """A case of servos in closed loop: what is logged, or known of its gains."""
     call: str = "irb140_jax.mismatch:diagnose"
     """What diagnoses: module:function of a robot and recordings, with a `Result`."""

@@ -9,6 +9,7 @@ model has the true gains ("known"), gains that are some 10 % wrong ("wrong") or 
 import dataclasses
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
 import mujoco
@@ -64,9 +65,11 @@ class Loop:
         self.loss, self.damping, self.stiffness, self.rest = (x if len(x) else np.zeros(len(self.kp)) for x in of)
 
 
-def bodies(loop: Loop, sizes: Sizes, rng: np.random.Generator, j: int, torque: float, kind: str) -> None:
+def bodies(
+    loop: Loop, sizes: Sizes, rng: np.random.Generator, j: int, torque: float, put_in: Callable[..., None]
+) -> None:
     """What changes the bodies, rotors, gravity or zeros alone is put in as for plants on prescribed paths."""
-    getattr(leaving_out, kind)(loop.plant, sizes, rng, j, torque)
+    put_in(loop.plant, sizes, rng, j, torque)
 
 
 def asymmetric(loop, sizes, rng, j, torque):
@@ -206,7 +209,7 @@ def push(loop, sizes, rng, j, torque):
     leaving_out.everywhere(loop.plant, "push", "external_wrench", {"t1 - t0": end - begin}, tolerate=("contact",))
 
 
-def thicker(loop, sizes, rng, j, torque):
+def shear_thinning(loop, sizes, rng, j, torque):
     """Friction that grows less than in proportion to speed."""
     speed = sizes.qd[j] * rng.uniform(0.05, 0.4)
     size = torque / np.arcsinh(sizes.qd[j] / speed)
@@ -220,10 +223,11 @@ def thicker(loop, sizes, rng, j, torque):
 
 
 KINDS: dict[str, Callable[..., None]] = {
-    "rotor_inertia": lambda *a: bodies(*a, kind="rotor"), "payload": lambda *a: bodies(*a, kind="payload"),
-    "gravity_tilt": lambda *a: bodies(*a, kind="tilt"), "encoder_offset": lambda *a: bodies(*a, kind="zero"),
+    "rotor_inertia": partial(bodies, put_in=leaving_out.rotor), "payload": partial(bodies, put_in=leaving_out.payload),
+    "gravity_tilt": partial(bodies, put_in=leaving_out.tilt),
+    "encoder_offset": partial(bodies, put_in=leaving_out.zero),
     "asymmetric_friction": asymmetric, "stribeck_friction": stribeck, "load_dependent_friction": loaded,
-    "position_dependent_friction": bump, "presliding_hysteresis": springy, "nonlinear_viscous_friction": thicker,
+    "position_dependent_friction": bump, "presliding_hysteresis": springy, "nonlinear_viscous_friction": shear_thinning,
     "torque_offset": offset, "torque_ripple": cogging, "gravity_spring": spring, "transmission_coupling": coupling,
     "joint_elasticity": elasticity, "backlash": play, "external_wrench": push,
 }  # fmt: skip
@@ -289,9 +293,8 @@ def make_servo(draw: str, index: int, form: Form, commit: str = "") -> Case:
 
 def rubbed(loop: Loop, sizes: Sizes, rng: np.random.Generator) -> None:
     """Ordinary friction on every joint where nothing stands for it."""
-    kinds = (("coulomb_friction", "coulomb", loop.loss, 0.05, 0.2, sizes.tau),
-             ("viscous_friction", "viscous", loop.damping, 0.03, 0.15, sizes.tau / sizes.qd))  # fmt: skip
-    for slug, name, where, low, high, unit in kinds:
+    kinds = (("coulomb", loop.loss, sizes.tau), ("viscous", loop.damping, sizes.tau / sizes.qd))
+    for (slug, (low, high)), (name, where, unit) in zip(rubbing.SHARES.items(), kinds, strict=True):
         for j in range(loop.plant.arm.n):
             share = rng.uniform(low, high)
             if j not in loop.plant.taken.get(slug, ()):

@@ -161,7 +161,7 @@ def test_the_comparison_ends_where_more_of_the_motion_is_pushed_than_commanded(n
 @pytest.mark.parametrize("seed", [1, 2])
 def test_pushes_that_no_command_knows_of_make_no_command_late(nominal_leg, seed):
     drive = drive_of(with_servo_torques([pushed_leg(0.4, seed)], nominal_leg, 0.05)[0][0])
-    assert not drive.delay.any()  # least squares without instruments: 11 ms, and four times its error
+    assert not drive.delay.any()
 
 
 def test_what_pushes_a_servo_is_not_taken_for_a_delay_of_its_torque(nominal_leg):

@@ -15,7 +15,13 @@ from scipy import interpolate
 from irb140_jax.errors import RecordingError
 from irb140_jax.recordings.drive import KD_WIDTH, Drive, unknown_drive
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.servo_estimates import Estimate, estimated_delay, estimated_gains, rows_of_joints
+from irb140_jax.recordings.servo_estimates import (
+    KD_UNSTATED_WIDTH,
+    Estimate,
+    estimated_delay,
+    estimated_gains,
+    rows_of_joints,
+)
 from irb140_jax.robot import Robot
 
 AT_LIMIT = 0.98  # of the torque limit: from here on a row is left out
@@ -25,7 +31,6 @@ DELAYED = (
     "friction explains the torque best. Whether commands are held from row to row or taken up late, the drive's torque "
     "lags, or the clocks are out of step can't be told from the fit; state [command_delay] in the map if it is known."
 )
-LEAST_KD_WIDTH = 0.5  # of an estimated Kd, which holds the joint's own viscous friction
 
 
 def with_servo_torques(
@@ -100,7 +105,7 @@ def _completed(drive: Drive, estimates: dict[int, Estimate]) -> Drive:
         if np.isnan(kp[j]) and e.spread < KNOWN:
             kp[j], kp_width[j], said[j] = e.kp, e.spread, "estimate"
         if np.isnan(drive.kd[j]):
-            kd[j], kd_width[j] = e.kd, LEAST_KD_WIDTH * e.kd
+            kd[j], kd_width[j] = e.kd, KD_UNSTATED_WIDTH * e.kd
     return dataclasses.replace(drive, kp=kp, kd=kd, kp_width=kp_width, kd_width=kd_width, said=tuple(said))
 
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy import linalg
 from scipy.optimize import nnls
 
 from irb140_jax.recordings.drive import KD_WIDTH, KP_WIDTH, Drive
@@ -28,6 +29,8 @@ CLEAR = 3.0  # standard deviations from which a delay is one
 # Shares of a joint's torque: standard deviations of what dry and viscous friction, a rotor and an offset that the model
 # lacks take, and what is left beside them.  On light legs a rotor is nearly all that a motor moves.
 LACKING, LEFT = (0.3, 0.3, 1.0, 0.3), 0.03
+KD_UNSTATED_WIDTH = 0.5  # relative standard deviation of an estimated Kd, which holds the joint's own viscous friction
+DISTINCT = 1e-8  # least singular value of instruments, of the largest
 NONNEGATIVE = 3  # how many of them can't be negative
 SETTLED = 5  # rounds in which noise and fit agree
 
@@ -140,7 +143,8 @@ def _log_evidence(rows: Rows, uncertainty: float) -> np.ndarray:
     if np.isnan(kp).any() or np.isnan(kd).any():
         found = estimated_gains(rows)
         # With the joint's viscous friction, and with what a late command adds.
-        kd, kd_width = np.where(np.isnan(kd), found.kd, kd), np.where(np.isnan(kd), 0.5 * found.kd, kd_width)
+        kd_width = np.where(np.isnan(kd), KD_UNSTATED_WIDTH * found.kd, kd_width)
+        kd = np.where(np.isnan(kd), found.kd, kd)
         kp, kp_width = np.where(np.isnan(kp), found.kp, kp), found.spread if np.isnan(kp).any() else kp_width
     if not np.isfinite(kp).all() or not len(kp):
         return np.zeros(len(rows.error))
@@ -176,7 +180,8 @@ def _instruments(rows: Rows) -> np.ndarray:
     """
     steps = np.diff(rows.command, axis=0)
     turned = np.tanh(steps[::4] / (0.02 * np.abs(steps).max() + 1e-300))
-    return np.linalg.qr(np.concatenate([np.ones((1, rows.command.shape[1])), rows.command, turned]).T)[0]
+    # Commands of neighbouring times are nearly the same: what only rounding tells apart is no instrument.
+    return linalg.orth(np.concatenate([np.ones((1, rows.command.shape[1])), rows.command, turned]).T, rcond=DISTINCT)
 
 
 def estimated_gains(rows: Rows) -> Estimate:
