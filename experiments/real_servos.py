@@ -72,14 +72,21 @@ def off(result: Result, runs: Sequence[Recording]) -> dict[str, list[np.ndarray]
     models = simulated(result.model, compiled_robot(robot, SIMULATED), SIMULATED)
     assert models is not None
     for run in runs:
-        assert run.drive is not None
+        drive = completed(run.drive, result.model.drive)
         times = np.arange(run.t[0], run.t[-1], SIMULATED)
-        asked = np.stack([np.interp(times, run.t, x) for x in taken_up(run, run.drive).T], axis=1)[None]
+        asked = np.stack([np.interp(times, run.t, x) for x in taken_up(run, drive).T], axis=1)[None]
         for name, apart in out.items():
             start, still = run.q[:1], np.zeros_like(run.q[:1])
-            went = positions([models.driven(name, run.drive)], start, still, np.zeros_like(asked), asked)[0, :-1]
+            went = positions([models.driven(name, drive)], start, still, np.zeros_like(asked), asked)[0, :-1]
             apart.append(run.q - np.stack([np.interp(run.t, times, x) for x in went.T], axis=1))
     return out
+
+
+def completed(stated: Drive | None, found: Drive | None) -> Drive:
+    """A run's drive, with the gains that are not stated and the delay of commands as they were found for others."""
+    assert stated is not None and found is not None
+    gains = {k: np.where(np.isnan(getattr(stated, k)), getattr(found, k), getattr(stated, k)) for k in ("kp", "kd")}
+    return dataclasses.replace(stated, **gains, delay=found.delay)
 
 
 def go2() -> dict[str, Any]:

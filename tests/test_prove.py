@@ -8,6 +8,7 @@ from helpers_recordings import motion, recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
+from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gram import JointGram
 from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
 from irb140_jax.mismatch.selection.explain import explain
@@ -108,6 +109,12 @@ def test_a_rare_effect_that_other_motions_contradict_is_not_proved():
     assert unproved(ex) == []
     assert unproved(contradicted(ex, rotor, 0)) == [("rotor_inertia", (1,))]
     assert {slug for slug, _ in unproved(contradicted(ex, usual, 0))} <= {"rotor_inertia"}
+    assert unproved(dataclasses.replace(contradicted(ex, rotor, 0), data=of_one_recording(ex))) == []
+
+
+def of_one_recording(ex: Explanation) -> Data:
+    """The data as if all of them were one recording: then no other motion contradicts anything."""
+    return dataclasses.replace(ex.data, stretches=[dataclasses.replace(s, recording=0) for s in ex.data.stretches])
 
 
 def test_the_discrepancy_is_carried_only_where_unseen_data_are_better_for_it(alike):

@@ -174,6 +174,17 @@ def test_what_pushes_a_servo_is_not_taken_for_a_delay_of_its_torque(nominal_leg)
         assert abs(inertia.value - 0.03) < 2.0 * inertia.std
 
 
+@pytest.mark.parametrize(("command", "seed"), [(closed_loop, 2), (to_and_fro, 1)])
+def test_dry_friction_that_turns_before_the_joint_is_neither_a_delay_nor_a_coupling(robot, command, seed):
+    """MuJoCo's does, by milliseconds: its constraints are soft."""
+    plant = two_links(shoulder='frictionloss=".4" damping=".13"', elbow='frictionloss=".2" damping=".02"')
+    recording, torque = to_and_fro(plant, 0.0, seed) if command is to_and_fro else command(plant, seed)
+    noise = 0.01 * np.random.default_rng(seed).normal(size=torque.shape)
+    result = diagnose(robot, [dataclasses.replace(recording, tau=torque + noise, qdes=None)])
+    friction = ("coulomb_friction", "viscous_friction")
+    assert names(result) == {(name, joint) for name in friction for joint in JOINTS}
+
+
 # --- reading ---------------------------------------------------------------------------------------------------------
 
 

@@ -2,9 +2,9 @@
 
 Four zero-mean blocks of features a joint, each with a size of its own: what depends on position alone, friction that
 depends on speed alone, what depends on several of position, speed, direction and load, and what friction may do
-differently around a change of direction, by bristles or lateness.  None holds a term that a named effect consists of
-(a constant, the direction itself, position, speed, acceleration, load): the discrepancy stands for what no law
-explains, not for the laws.
+differently around a change of direction, by bristles or lateness; in logs of commands also what a servo does late.
+None holds a term that a named effect consists of (a constant, the direction itself, position, speed, acceleration,
+load; of logged torque how fast it changes): the discrepancy stands for what no law explains, not for the laws.
 
 Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(3), 2001; the low rank as in Rasmussen
 and Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
@@ -116,8 +116,8 @@ def _smooth(r: Conditioned, carried: np.ndarray, j: int, position: np.ndarray, s
 def _reversal(
     r: Conditioned, load: np.ndarray, carried: np.ndarray, scales: Scales, j: int, rounded: np.ndarray
 ) -> np.ndarray:
-    """What happens around one joint's reversals and along its slopes, shape (T, 37)."""
-    q, qd, qdd, dt = r.q[:, j], r.qd[:, j], r.qdd[:, j], float(np.mean(np.diff(r.t)))
+    """What happens around one joint's reversals, and what a servo does late, shape (T, 37)."""
+    q, qd, qdd = r.q[:, j], r.qd[:, j], r.qdd[:, j]
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
     base = [_relaxed(q, share * travel) - direction for share in settings.BRISTLE_TRAVELS]
@@ -126,7 +126,9 @@ def _reversal(
     alone = np.stack(base, axis=1)
     X, even = np.concatenate([alone, rounded], axis=1), np.abs(carried)[:, None]
     pushed = np.abs(qdd)[:, None] / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
-    slopes = np.stack([np.gradient(load[:, j], dt), np.gradient(qdd, dt)], axis=1)
+    dt = float(np.mean(np.diff(r.t)))
+    # Torque that was logged is late by laws of the log; beside those, this would take the delay off the load again.
+    slopes = (r.servo is not None) * np.stack([np.gradient(load[:, j], dt), np.gradient(qdd, dt)], axis=1)
     return np.concatenate([alone, X * even, X * pushed, slopes], axis=1)
 
 

@@ -225,20 +225,29 @@ def _of_own(extra: Nuisances, w: list[np.ndarray]) -> np.ndarray:
 
 def held_out_gains(ex: Explanation) -> dict[int, float]:
     """Share of the whitened squared error on unseen data, noise included, that each finding removes."""
-    whole, without = _unseen_errors(ex)
-    return {i: (error - whole) / max(error, 1e-300) for i, error in without.items()}
+    left_out = folds(ex)
+    whole = _unseen_errors(ex, ex.chosen, left_out).sum()
+    without = {i: _unseen_errors(ex, ex.others(i), left_out).sum() for i in ex.chosen}
+    return {i: float((error - whole) / max(error, 1e-300)) for i, error in without.items()}
 
 
 def unproved(ex: Explanation) -> list[Site]:
-    """The rare effect whose loss on unseen data outweighs its log odds by the most, if one's does.
+    """The rare effect for which unseen data speak least, if they don't give it the odds of a name.
 
     Evidence trusts that some law is true.  Where none of them knows what the model errs by, one may fit all the same,
-    and motions that the fit did not see tell.  Both are in nats.
+    and motions that the fit did not see tell: by how many nats they are more probable with it, each joint's error as
+    large as it is there.  Blocks of one motion are no other motion: where there are no others, nothing is taken away.
     """
-    whole, without = _unseen_errors(ex)
-    lost = {i: 0.5 * (whole - error) for i, error in without.items() if error < whole and _is_rare(ex, i)}
-    weight = {i: ex.log_odds(i) - nats for i, nats in lost.items()}
-    return [site_of(ex.data.candidates[i]) for i in sorted(weight, key=lambda i: weight[i])[:1] if weight[i] < 0.0]
+    left_out, recording = folds(ex), recordings_of_blocks(ex)
+    if all(np.isin(recording[~fold], recording[fold]).any() for fold in left_out):
+        return []
+    rows = np.array([float(g.rows.sum()) for g in ex.by_block.joints])
+    whole, nats = _unseen_errors(ex, ex.chosen, left_out), {}
+    for i in filter(lambda i: _is_rare(ex, i), ex.chosen):
+        without = _unseen_errors(ex, ex.others(i), left_out)
+        nats[i] = 0.5 * float(np.sum(rows * np.log((without + 1e-300) / (whole + 1e-300))))
+    least = np.log(settings.NAMED / (1.0 - settings.NAMED))
+    return [site_of(ex.data.candidates[i]) for i in sorted(nats, key=lambda i: nats[i])[:1] if nats[i] < least]
 
 
 def _is_rare(ex: Explanation, index: int) -> bool:
@@ -247,26 +256,20 @@ def _is_rare(ex: Explanation, index: int) -> bool:
     return not (c.effect.prior.ordinary or c.is_inertials or index in ex.falls)
 
 
-def _unseen_errors(ex: Explanation) -> tuple[float, dict[int, float]]:
-    """Whitened squared error on unseen data of an explanation, and of it without each finding."""
-    left_out = folds(ex)
-    return _unseen_error(ex, ex.chosen, left_out), {i: _unseen_error(ex, ex.others(i), left_out) for i in ex.chosen}
-
-
-def _unseen_error(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> float:
-    """Whitened squared error of a set on data that its fit did not see."""
-    space, error, energy = ex.by_block, 0.0, _energy(ex, chosen)
-    columns = space.with_y(space.set_columns(chosen))
+def _unseen_errors(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> np.ndarray:
+    """Whitened squared error of a set on data that its fit did not see, by joint, shape (n,)."""
+    space, energy = ex.by_block, _energy(ex, chosen)
+    error, columns = np.zeros(len(space.joints)), space.with_y(space.set_columns(chosen))
     seen = ex.posterior(chosen, instrument=False).mean
     for fold in left_out:
         only = _only_here(ex, chosen, energy, fold)
         mean = np.where(only, seen, ex.posterior(chosen, fold, instrument=False).mean)
         w = np.zeros(len(columns))
         w[: space.inertials], w[space.offset : -1], w[-1] = mean[: space.inertials], mean[space.inertials :], -1.0
-        for g, place in zip(space.joints, space.places, strict=True):
+        for j, (g, place) in enumerate(zip(space.joints, space.places, strict=True)):
             at = place[columns]
             v, at = w[at >= 0], at[at >= 0] + len(g.groups)
-            error += float(v @ g.blocks[fold].sum(axis=0)[np.ix_(at, at)] @ v)
+            error[j] += float(v @ g.blocks[fold].sum(axis=0)[np.ix_(at, at)] @ v)
     return error
 
 
