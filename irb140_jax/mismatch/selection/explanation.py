@@ -41,7 +41,7 @@ class Explanation:
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
         falls: Members that are named because friction certainly falls with speed, whatever its form.
         scaled: Whether one scale of all logged torques is a finding.
-        unproved: What the search found and unseen motions don't speak for: not named.
+        unproved: What the search found and unseen motions speak against: not named.
     """
 
     lib: Library

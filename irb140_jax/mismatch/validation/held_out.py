@@ -232,22 +232,22 @@ def held_out_gains(ex: Explanation) -> dict[int, float]:
 
 
 def unproved(ex: Explanation) -> list[Site]:
-    """The rare effect for which unseen data speak least, if they don't give it the odds of a name.
+    """The rare effect against which unseen data speak most, if they do so with the odds of a name.
 
     Evidence trusts that some law is true.  Where none of them knows what the model errs by, one may fit all the same,
-    and motions that the fit did not see tell: by how many nats they are more probable with it, each joint's error as
+    and motions that the fit did not see tell: by how many nats they are less probable with it, each joint's error as
     large as it is there.  Blocks of one motion are no other motion: where there are no others, nothing is taken away.
     """
     left_out, recording = folds(ex), recordings_of_blocks(ex)
     if all(np.isin(recording[~fold], recording[fold]).any() for fold in left_out):
         return []
     rows = np.array([float(g.rows.sum()) for g in ex.by_block.joints])
-    whole, nats = _unseen_errors(ex, ex.chosen, left_out), {}
+    whole, against = _unseen_errors(ex, ex.chosen, left_out), {}
     for i in filter(lambda i: _is_rare(ex, i), ex.chosen):
         without = _unseen_errors(ex, ex.others(i), left_out)
-        nats[i] = 0.5 * float(np.sum(rows * np.log((without + 1e-300) / (whole + 1e-300))))
-    least = np.log(settings.NAMED / (1.0 - settings.NAMED))
-    return [site_of(ex.data.candidates[i]) for i in sorted(nats, key=lambda i: nats[i])[:1] if nats[i] < least]
+        against[i] = 0.5 * float(np.sum(rows * np.log((whole + 1e-300) / (without + 1e-300))))
+    most, worst = np.log(settings.NAMED / (1.0 - settings.NAMED)), sorted(against, key=lambda i: -against[i])[:1]
+    return [site_of(ex.data.candidates[i]) for i in worst if against[i] > most]
 
 
 def _is_rare(ex: Explanation, index: int) -> bool:
