@@ -23,7 +23,7 @@ from irb140_jax.mismatch import Result, diagnose, predict
 from irb140_jax.mismatch.motion.models import compiled_robot, simulated
 from irb140_jax.oracle.rollout import positions
 from irb140_jax.recordings import Recording
-from irb140_jax.recordings.drive import Drive
+from irb140_jax.recordings.drive import ARRAYS, Drive
 from irb140_jax.recordings.machines import (
     go2_model,
     go2_recording,
@@ -83,10 +83,10 @@ def off(result: Result, runs: Sequence[Recording]) -> dict[str, list[np.ndarray]
 
 
 def completed(stated: Drive | None, found: Drive | None) -> Drive:
-    """A run's drive, with the gains that are not stated and the delay of commands as they were found for others."""
+    """A run's drive, with the gains that are not stated and all times as they were found for others."""
     assert stated is not None and found is not None
     gains = {k: np.where(np.isnan(getattr(stated, k)), getattr(found, k), getattr(stated, k)) for k in ("kp", "kd")}
-    return dataclasses.replace(stated, **gains, delay=found.delay)
+    return dataclasses.replace(stated, **gains, delay=found.delay, lag=found.lag)
 
 
 def go2() -> dict[str, Any]:
@@ -150,8 +150,8 @@ def only(r: Recording, joint: str) -> Recording:
     """A recording of one joint alone."""
     j = [r.joint_names.index(joint)]
     assert r.qdes is not None and r.drive is not None
-    parts = {f.name: getattr(r.drive, f.name)[j] for f in dataclasses.fields(r.drive) if f.name != "said"}
-    drive = Drive(**parts, said=(r.drive.said[j[0]],))
+    parts = {name: getattr(r.drive, name)[j] for name in ARRAYS}
+    drive = dataclasses.replace(r.drive, **parts, said=(r.drive.said[j[0]],))
     return Recording(t=r.t, q=r.q[:, j], tau=r.tau[:, j], qdes=r.qdes[:, j], joint_names=(joint,), source=r.source,
                      drive=drive)
 

@@ -18,6 +18,20 @@ if "PYTEST_XDIST_WORKER" not in os.environ and "JAX_COMPILATION_CACHE_DIR" not i
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.05"
 
 
+# Files that take longest come first, so that no worker is left with one of them when the other is done.
+LONGEST = (
+    "real_machines", "reproduce_all", "servo", "whole_diagnosis", "unknown", "recovery", "native_gravity", "notebooks",
+    "trees", "demo", "learned", "sharding", "control", "control_study", "corrected", "excite", "diagnose_many",
+    "abrupt", "laws",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items):
+    """The longest files first; --no-loadscope-reorder keeps that order."""
+    place = {f"test_{name}": k for k, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path.stem, len(LONGEST)))
+
+
 @pytest.fixture(autouse=True, scope="module")
 def few_compiled_programs():
     """Files of tests that compile more than a process may hold don't crash those after them."""

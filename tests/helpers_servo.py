@@ -26,14 +26,17 @@ def two_links(kp=KP, kd=KD, shoulder="", elbow="", limit=None, actuators=None, g
 </body></body></worldbody><actuator>{own if actuators is None else actuators}</actuator></mujoco>"""
 
 
-def closed_loop(xml, seed=1, duration=16.0, delay=0.0, noise=NOISE):
-    """A recording of commands and positions, and the torque that MuJoCo's actuators gave, (T, 2) [N m]."""
+def closed_loop(xml, seed=1, duration=16.0, delay=0.0, noise=NOISE, lag=0.0):
+    """A recording of commands and positions, and the torque that MuJoCo's actuators gave, (T, 2) [N m].
+
+    Commands act `delay` late [s].  With a lag [s] there are no actuators: torque by their law comes so much later.
+    """
     rng = np.random.default_rng(seed)
     t = np.arange(round(duration / STEP)) * STEP
     waves = [(rng.uniform(0.1, 0.35), rng.uniform(0.15, 1.6), rng.uniform(0.0, 6.0)) for _ in range(10)]
     wave = lambda k: sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in waves[5 * k : 5 * k + 5])  # noqa: E731
     command = np.stack([wave(0), wave(1)], axis=1)
-    return _logged(xml, t, command, rng, seed, noise, late=round(delay / STEP))
+    return _logged(xml, t, command, rng, seed, noise, late=round(delay / STEP), lag=round(lag / STEP))
 
 
 def to_and_fro(xml, pushed, seed=1, noise=2e-5):
@@ -56,15 +59,18 @@ def to_and_fro(xml, pushed, seed=1, noise=2e-5):
     return _logged(xml, t, command, rng, seed, noise, push=push)
 
 
-def _logged(xml, t, command, rng, seed, noise, late=0, push=None):
+def _logged(xml, t, command, rng, seed, noise, late=0, push=None, lag=0):
     model = mujoco.MjModel.from_xml_string(xml)
     data, q, torque = mujoco.MjData(model), np.empty_like(command), np.empty_like(command)
-    data.qpos[:] = command[0]
+    data.qpos[:], made = command[0], []
     for i in range(len(t)):
-        q[i], data.ctrl[:] = data.qpos, command[max(i - late, 0)]
-        data.qfrc_applied[:] = 0.0 if push is None else push[i]
+        q[i], wanted = data.qpos, command[max(i - late, 0)]
+        made.append(np.array(KP) * (wanted - data.qpos) - np.array(KD) * data.qvel)
+        data.qfrc_applied[:] = made[max(i - lag, 0)] if lag else 0.0
+        data.qfrc_applied[:] += 0.0 if push is None else push[i]
+        data.ctrl[:] = wanted if model.nu else ()
         mujoco.mj_step(model, data)
-        torque[i] = data.qfrc_actuator
+        torque[i] = made[max(i - lag, 0)] if lag else data.qfrc_actuator
     rows = slice(round(0.5 / STEP), None, round(1.0 / RATE / STEP))
     q = q[rows] + noise * rng.normal(size=q[rows].shape)
     recording = Recording(

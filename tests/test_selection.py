@@ -54,7 +54,8 @@ def planted(seed: int, amplitudes: dict[int, float]) -> tuple[Space, list[dict[s
     nothing = np.zeros((len(candidates), 1)), -free[:, 0]
     kinds = Kinds(np.full(len(candidates), -1), np.zeros(0), 0.05)
     space = Space(
-        tuple(joints), tuple(candidates), INERTIALS, INERTIALS + COMMON, size, prior, kinds, -free, free, *nothing
+        tuple(joints), tuple(candidates), INERTIALS, INERTIALS + COMMON, size, prior, kinds, -free, free, *nothing,
+        np.zeros(COMMON),
     )
     return space, data
 
@@ -80,13 +81,16 @@ def density(
     cov[:ROWS, :ROWS] += blocks[0]
     cov[ROWS:, ROWS:] += blocks[1]
     y = np.concatenate([d["y"] for d in data])
-    density = stats.multivariate_normal(np.zeros(len(y)), cov)  # pyright: ignore[reportArgumentType]: stubs want a number
+    mean = Z[:, INERTIALS : INERTIALS + COMMON] @ space.centre
+    density = stats.multivariate_normal(mean, cov)  # pyright: ignore[reportArgumentType]: stubs want a number
     return float(density.logpdf(y)) + 0.5 * len(y) * np.log(2.0 * np.pi)
 
 
+@pytest.mark.parametrize("centre", [0.0, 1.3])
 @pytest.mark.parametrize("chosen", [(), (0,), (1, 6), (0, 3, 5)])
-def test_the_evidence_of_a_set_is_the_density_of_the_data(chosen):
+def test_the_evidence_of_a_set_is_the_density_of_the_data(chosen, centre):
     space, data = planted(1, {0: 1.0, 5: 0.5})
+    space = dataclasses.replace(space, centre=centre * np.linspace(-1.0, 1.0, COMMON + 1)[1:])
     hyper = (SETTING, (0, 2, 5, ONE))
     widths = [density(space, data, chosen, hyper, w) for w in WIDTHS] + LOG_PRIOR
     sizes = sum(log_prior_of_sizes()[list(own[:-1])].sum() for own in hyper)
@@ -97,6 +101,7 @@ def test_the_evidence_of_a_set_is_the_density_of_the_data(chosen):
 
 def test_screening_says_what_the_evidence_says_at_the_width_of_the_inertials_of_the_set_before():
     space, data = planted(2, {2: 1.0})
+    space = dataclasses.replace(space, centre=np.full(COMMON, 0.8))
     hyper, which = (SETTING, SETTING), np.array([0, 1, 3, 5])
     width = space.width((2,), hyper)
     before = density(space, data, (2,), hyper, width)

@@ -99,9 +99,29 @@ def test_an_unknown_kp_is_estimated_from_the_nominal_inertials_and_said_with_its
 
 def test_a_delay_of_all_commands_is_found_and_its_place_left_open(robot):
     recording, _ = closed_loop(two_links(), delay=0.010)
-    (made,), notes = with_servo_torques([dataclasses.replace(recording, drive=STATED)], robot, 0.05)
+    (made,), _ = with_servo_torques([dataclasses.replace(recording, drive=STATED)], robot, 0.05)
     np.testing.assert_allclose(drive_of(made).delay, 0.010, atol=5e-4)
-    assert any("can't be told from the fit" in note for note in notes)
+
+
+@pytest.mark.parametrize(("delay", "lag"), [(0.004, 0.0), (0.0, 0.006)])
+def test_a_late_command_and_a_torque_that_lags_are_told_apart_and_no_physics(robot, delay, lag):
+    friction = 'frictionloss=".4" damping=".13"', 'frictionloss=".2" damping=".02"'
+    plant = two_links(shoulder=friction[0], elbow=friction[1], actuators="" if lag else None)
+    loops = [closed_loop(plant, seed, delay=delay, lag=lag)[0] for seed in (1, 2)]
+    config = DiagnoseConfig(effects=tuple(CATALOGUE[slug] for slug in LIBRARY))
+    result = diagnose(robot, [dataclasses.replace(r, drive=STATED) for r in loops], config)
+    drive = result.model.drive
+    assert drive is not None and abs(drive.lag - lag) < 1e-3
+    np.testing.assert_allclose(drive.delay, delay, atol=1e-3)
+    assert {f.effect for f in result.diagnosis.findings} <= {"coulomb_friction", "viscous_friction"}
+    assert any("can't be told from the fit" in note for note in result.diagnosis.notes)
+
+
+def test_a_drive_that_lags_gives_the_same_torque_later():
+    recording, _ = closed_loop(two_links(), duration=3.0)
+    (now, later) = (with_torque(recording, dataclasses.replace(STATED, lag=lag)).tau for lag in (0.0, 2.0 / 200.0))
+    np.testing.assert_allclose(later[2:], now[:-2], atol=1e-9)
+    assert type(STATED).from_json(dataclasses.replace(STATED, lag=0.01).to_json()).lag == 0.01
 
 
 def test_commands_that_are_held_from_row_to_row_act_half_a_row_late(tmp_path):

@@ -102,6 +102,7 @@ def _diagnosed(
         return _nothing_compared(data, config, reason)
     sensors = scatter_by_sensor(robot, data.recordings, data.smooth, data.band)
     ex = _explained(data, sensors, config, progress)
+    data = data.later(*ex.delay) if any(ex.delay) else data
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
     proof = held_out(ex, refit)
@@ -137,7 +138,8 @@ def _explained(
     """What the model leaves out, with one scale of all torques where that is probable."""
     scatter, uncertainty = np.hypot(*sensors), config.inertial_uncertainty
     effects = [e for e in config.effects if data.servo is None or not e.place.of_clocks]
-    ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved)
+    later = None if data.servo is None or data.delay_stated else lambda *delay: data.later(*delay).smooth
+    ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved, later)
     ex = without_negligible(ex, data.servo)
     return dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= settings.NAMED)
 

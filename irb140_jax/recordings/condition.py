@@ -11,7 +11,7 @@ import numpy as np
 from scipy import interpolate, ndimage
 
 from irb140_jax.recordings.direction import REST, direction_of
-from irb140_jax.recordings.drive import OWN_DELAY_WIDTH, ROWS_WIDTH, Drive
+from irb140_jax.recordings.drive import LAG_WIDTH, OWN_DELAY_WIDTH, ROWS_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.servo import taken_up
@@ -33,6 +33,7 @@ class Commanded:
         command_rate: Derivative of the commanded positions, anti-aliased as the torque [rad/s or m/s], shape (T, n).
         asked_speed: Commanded speeds [rad/s or m/s], shape (T, n).
         own_delay_width: Standard deviation of the time at which those of one joint are taken up beside all others' [s].
+        lag_width: Standard deviation of how much later the torque comes than this says, never earlier [s].
     """
 
     drive: Drive
@@ -40,6 +41,7 @@ class Commanded:
     command_rate: np.ndarray
     asked_speed: np.ndarray
     own_delay_width: float
+    lag_width: float = LAG_WIDTH
 
 
 @dataclasses.dataclass(frozen=True)

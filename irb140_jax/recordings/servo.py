@@ -2,8 +2,8 @@
 
     torque = Kp (qdes(t - delay) - q) + Kd (qddes - qd)
 
-qddes is zero where it is not logged.  Rows in which a drive is at its limit are left out: there the torque says nothing
-of the command, and which part of the law was cut is not known.
+qddes is zero where it is not logged.  All of it may come later, by the lag of the drive.  Rows in which a drive is at
+its limit are left out: there the torque says nothing of the command, and which part of the law was cut is not known.
 """
 
 import dataclasses
@@ -13,7 +13,7 @@ import numpy as np
 from scipy import interpolate
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.drive import KD_WIDTH, Drive, unknown_drive
+from irb140_jax.recordings.drive import COMMON_DELAY_WIDTH, KD_WIDTH, Drive, unknown_drive
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.servo_estimates import (
     KD_UNSTATED_WIDTH,
@@ -26,11 +26,6 @@ from irb140_jax.robot import Robot
 
 AT_LIMIT = 0.98  # of the torque limit: from here on a row is left out
 KNOWN = 0.5  # relative standard deviation up to which an estimated Kp gives torque at all
-DELAYED = (
-    "Commands are taken to act {:.3g} +- {:.2g} ms after their row on all joints alike: so the model with usual "
-    "friction explains the torque best. Whether commands are held from row to row or taken up late, the drive's torque "
-    "lags, or the clocks are out of step can't be told from the fit; state [command_delay] in the map if it is known."
-)
 
 
 def with_servo_torques(
@@ -58,17 +53,17 @@ def with_servo_torques(
                              "torque; give recordings of one kind")
     drives = [r.drive or unknown_drive(robot.n) for r in servos]
     unstated = not any(d.delay.any() for d in drives)
-    delay, spread = estimated_delay(servos, drives, robot, uncertainty) if unstated else (0.0, 0.0)
+    delay = estimated_delay(servos, drives, robot, uncertainty) if unstated else 0.0
+    width = COMMON_DELAY_WIDTH if unstated else 0.0
     rows = rows_of_joints(servos, drives, robot, (delay,))
     estimates: dict[int, Estimate] = {}
     for j in range(robot.n):
         if any(np.isnan(d.kp[j]) or np.isnan(d.kd[j]) for d in drives):
             found = estimated_gains(rows[j])
             estimates[j] = found._replace(spread=float(np.hypot(found.spread, uncertainty)))
-    drives = [dataclasses.replace(d, delay=d.delay + delay) for d in drives]
+    drives = [dataclasses.replace(d, delay=d.delay + delay, common_delay_width=width) for d in drives]
     out = [with_torque(r, _completed(d, estimates)) for r, d in zip(servos, drives, strict=True)]
-    late = [DELAYED.format(1e3 * delay, 1e3 * spread)] if delay else []
-    return out, [*_gain_notes(robot, out, drives, estimates, uncertainty), *late, *_saturation_notes(out)]
+    return out, [*_gain_notes(robot, out, drives, estimates, uncertainty), *_saturation_notes(out)]
 
 
 def with_torque(recording: Recording, drive: Drive) -> Recording:
@@ -82,6 +77,10 @@ def with_torque(recording: Recording, drive: Drive) -> Recording:
     cut = (np.abs(asked) >= AT_LIMIT * drive.limit) | (np.abs(tau) >= AT_LIMIT * drive.limit)
     lost = cut | ~known
     tau = np.clip(tau, -drive.limit, drive.limit)
+    if drive.lag:
+        t = recording.t - drive.lag
+        tau, lost = (np.stack([np.interp(t, recording.t, x) for x in of.T], axis=1) for of in (tau, 1.0 * lost))
+        lost = lost > 0.0
     return dataclasses.replace(recording, tau=tau, drive=drive, torque_lost=lost if lost.any() else None)
 
 

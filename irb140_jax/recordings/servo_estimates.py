@@ -107,8 +107,8 @@ def _later(r: Recording, d: Drive, delay: float) -> np.ndarray:
 
 def estimated_delay(
     servos: Sequence[Recording], drives: Sequence[Drive], robot: Robot, uncertainty: float
-) -> tuple[float, float]:
-    """Delay of all commands alike beyond what is stated, and its standard deviation [s]; 0 where none is clear.
+) -> float:
+    """Delay of all commands alike beyond what is stated [s], 0 where none is clear: where the search begins.
 
     On slow motion a late command looks like viscous friction, Kp times the delay of it at every joint.  So what is
     known beforehand decides: how well Kd is known, how large friction usually is, and that the delay is one.
@@ -129,7 +129,7 @@ def estimated_delay(
     odds = log_evidence(fine)
     best, weight = fine[np.argmax(odds)], np.exp(odds - odds.max())
     spread = float(max(np.sqrt(weight @ (fine - best) ** 2 / weight.sum()), FINE))
-    return (float(best), spread) if best > CLEAR * spread else (0.0, 0.0)
+    return float(best) if best > CLEAR * spread else 0.0
 
 
 def _log_evidence(rows: Rows, uncertainty: float) -> np.ndarray:

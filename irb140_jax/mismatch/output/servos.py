@@ -108,13 +108,20 @@ def of_servos(ex: Explanation, servo: Commanded | None, found: list[Finding]) ->
     return out
 
 
-def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
-    """A note for every servo that applies its commands late, or whose torque lags as much.
+def command_notes(ex: Explanation, servo: Commanded, stated: bool) -> list[str]:
+    """How late all servos apply their commands, where that is not stated, and a note for every one that differs.
 
-    Its odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
+    The odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
     any rare effect.
     """
-    out = []
+    more, unsure = ex.command_delay(servo)
+    late, lag = float(np.min(servo.drive.delay)) + more - ex.delay[0], ex.torque_lag() if ex.delay[1] else 0.0
+    out = [] if stated or max(late, lag) < unsure else [
+        f"Commands of all joints are taken to act {digits(1e3 * late)} +- {digits(1e3 * unsure, 1)} ms after their "
+        f"row, and torque to lag {digits(1e3 * lag)} ms more: so the recordings suit the model best. Where the time is "
+        "lost can't be told from the fit: whether commands are held from row to row or taken up late, the drive's "
+        "torque lags, or the clocks are out of step. State [command_delay] in the map if it is known."
+    ]  # fmt: skip
     for j in range(ex.lib.robot.n):
         own, spread = _own_nuisance(ex, j, COMMAND_DELAY)
         odds = log_odds_of_any(own, spread, 1.0) + np.log(settings.RARE)

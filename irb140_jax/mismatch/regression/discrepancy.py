@@ -2,9 +2,9 @@
 
 Four zero-mean blocks of features a joint, each with a size of its own: what depends on position alone, friction that
 depends on speed alone, what depends on several of position, speed, direction and load, and what friction may do
-differently around a change of direction, by bristles or lateness; in logs of commands also what a servo does late.
-None holds a term that a named effect consists of (a constant, the direction itself, position, speed, acceleration,
-load; of logged torque how fast it changes): the discrepancy stands for what no law explains, not for the laws.
+differently around a change of direction, by bristles or lateness.  None holds a term that a named effect consists of
+(a constant, the direction itself, position, speed, acceleration, load, how fast the load changes): the discrepancy
+stands for what no law explains, not for the laws.
 
 Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(3), 2001; the low rank as in Rasmussen
 and Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
@@ -21,7 +21,7 @@ from irb140_jax.recordings.condition import Conditioned
 
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
-FEATURES = 82  # of all blocks
+FEATURES = 80  # of all blocks
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +83,7 @@ def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> list[n
     speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
     rounded, tails = by_speed(r.qd[:, j], r.direction[:, j], float(scales.speed[j]))
     carried = load[:, j] / max(float(scales.torque[j]), 1e-12)
-    smooth, reversal = _smooth(r, carried, j, position, speed), _reversal(r, load, carried, scales, j, rounded)
+    smooth, reversal = _smooth(r, carried, j, position, speed), _reversal(r, carried, scales, j, rounded)
     return [position[:, 1:], np.concatenate([rounded, tails], axis=1), smooth, reversal]
 
 
@@ -113,10 +113,8 @@ def _smooth(r: Conditioned, carried: np.ndarray, j: int, position: np.ndarray, s
     return np.concatenate([p.reshape(len(position), -1) for p in parts], axis=1)
 
 
-def _reversal(
-    r: Conditioned, load: np.ndarray, carried: np.ndarray, scales: Scales, j: int, rounded: np.ndarray
-) -> np.ndarray:
-    """What happens around one joint's reversals, and what a servo does late, shape (T, 37)."""
+def _reversal(r: Conditioned, carried: np.ndarray, scales: Scales, j: int, rounded: np.ndarray) -> np.ndarray:
+    """What happens around one joint's reversals, shape (T, 35)."""
     q, qd, qdd = r.q[:, j], r.qd[:, j], r.qdd[:, j]
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
@@ -126,10 +124,7 @@ def _reversal(
     alone = np.stack(base, axis=1)
     X, even = np.concatenate([alone, rounded], axis=1), np.abs(carried)[:, None]
     pushed = np.abs(qdd)[:, None] / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
-    dt = float(np.mean(np.diff(r.t)))
-    # Torque that was logged is late by laws of the log; beside those, this would take the delay off the load again.
-    slopes = (r.servo is not None) * np.stack([np.gradient(load[:, j], dt), np.gradient(qdd, dt)], axis=1)
-    return np.concatenate([alone, X * even, X * pushed, slopes], axis=1)
+    return np.concatenate([alone, X * even, X * pushed], axis=1)
 
 
 def _relaxed(q: np.ndarray, travel: float) -> np.ndarray:

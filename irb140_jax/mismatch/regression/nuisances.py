@@ -9,7 +9,7 @@ from irb140_jax.effects import Scales
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Prepared
 from irb140_jax.mismatch.regression.discrepancy import features
-from irb140_jax.mismatch.regression.servo import scale_width, servo_columns
+from irb140_jax.mismatch.regression.servo import common_columns, scale_width, servo_columns
 from irb140_jax.mismatch.regression.tangent import Point, delayed, late
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
@@ -78,17 +78,19 @@ def nuisances(
     for r, (a, (load, total)) in enumerate(zip(along, torques, strict=True)):
         motion, dt = a.recording, float(np.mean(np.diff(a.recording.t)))
         rate = delayed(at, total, dt)
+        early = motion.servo.lag_width if motion.servo else settings.DELAY_COMMON
+        # Of a servo's torque, which is made of commands and positions, each joint's commands have a time of their own.
+        own_delay = 0.0 if motion.servo else settings.DELAY_JOINT
         bend = settings.SMOOTHED * np.gradient(np.gradient(total, dt, axis=0), dt, axis=0)
         rotor = settings.ROTOR_ERROR * np.asarray(robot.armature) * motion.qdd
         bias = settings.BIAS * scales.torque * (1.0 - np.abs(motion.direction))
         gain, bend, rotor, bias = (late(at, x, np.arange(n), dt) for x in (load, bend, rotor, bias))
-        common = settings.GAIN_COMMON * gain, settings.DELAY_COMMON * rate, 2.0 * bend
-        commons.append(band.apply(np.stack(common, axis=-1)))
+        common = np.stack([settings.GAIN_COMMON * gain, early * rate, 2.0 * bend], axis=-1)
+        commons.append(band.apply(np.concatenate([common, common_columns(motion)], axis=-1)))
         joints = []
         for j in range(n):
             wide = np.hypot(settings.GAIN_JOINT, scale_width(motion, j))
-            fixed = (wide * gain[:, j], settings.DELAY_JOINT * rate[:, j], rotor[:, j], bend[:, j], bias[:, j])
-            # A servo's torque is made of commands and positions: it is never late against them.
+            fixed = (wide * gain[:, j], own_delay * rate[:, j], rotor[:, j], bend[:, j], bias[:, j])
             fixed = np.concatenate([np.stack(fixed, axis=1), servo_columns(motion, j)], axis=1)
             # Levels of dry and viscous friction about their mean, a law's; of one recording there is nothing beside it.
             own = (np.arange(count) == r) - 1.0 / count if count > 1 else np.zeros(0)

@@ -25,6 +25,14 @@ def servo_columns(motion: Conditioned, j: int) -> np.ndarray:
     return np.stack([damping, late], axis=1)
 
 
+def common_columns(motion: Conditioned) -> np.ndarray:
+    """A delay of all commands alike in prior units, shape (T, n, 1); (T, n, 0) where torque was logged."""
+    servo = motion.servo
+    if servo is None:
+        return np.zeros((*motion.q.shape, 0))
+    return (servo.drive.common_delay_width * np.nan_to_num(servo.drive.kp) * servo.command_rate)[..., None]
+
+
 def scale_width(motion: Conditioned, j: int) -> float:
     """Relative standard deviation of a servo's Kp; zero where torque was logged."""
     return 0.0 if motion.servo is None else float(np.nan_to_num(motion.servo.drive.kp_width[j]))

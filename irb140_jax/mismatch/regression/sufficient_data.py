@@ -10,10 +10,11 @@ from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.channels import with_lost_torque_marked
 from irb140_jax.recordings.check import MOVING, checked_numbers
 from irb140_jax.recordings.condition import Commanded, Conditioned, conditioned
+from irb140_jax.recordings.drive import LAG_WIDTH
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.repeats import with_motions_numbered, without_copies
-from irb140_jax.recordings.servo import with_servo_torques
+from irb140_jax.recordings.servo import with_servo_torques, with_torque
 from irb140_jax.robot import Robot
 
 MORE = "record at least 15 s in which every joint moves, with a dozen reversals"
@@ -30,6 +31,7 @@ class Comparison:
         band: Of the comparison.
         servo_notes: What was assumed of servos, a sentence each.
         notes: What was left out or counts only once, a sentence each.
+        delay_stated: Whether it is stated how late commands are taken up.
     """
 
     robot: Robot
@@ -38,6 +40,7 @@ class Comparison:
     band: Band
     servo_notes: list[str]
     notes: list[str]
+    delay_stated: bool = True
 
     @property
     def names(self) -> list[str]:
@@ -53,6 +56,14 @@ class Comparison:
     def rows(self) -> np.ndarray:
         """Low-passed rows in which each joint moves and nothing is lost, over all recordings, shape (n,)."""
         return usable_rows(self.smooth, self.band)
+
+    def later(self, delay: float, lag: float) -> "Comparison":
+        """The same with commands taken up so much later, and torque that lags so much [s]: logs of commands alone."""
+        recordings = [_later(r, delay, lag) for r in self.recordings]
+        smooth, _ = with_motions_numbered(conditioned(recordings, self.band), recordings)
+        servos = [r.servo and dataclasses.replace(r.servo, lag_width=LAG_WIDTH if lag > 0.0 else 0.0) for r in smooth]
+        smooth = [dataclasses.replace(r, servo=servo) for r, servo in zip(smooth, servos, strict=True)]
+        return dataclasses.replace(self, recordings=recordings, smooth=smooth)
 
 
 def comparison(
@@ -70,12 +81,13 @@ def comparison(
         RecordingError: A recording is too short for any filter, or holds what is no number.
     """
     moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
+    stated = any(r.drive is not None and bool(r.drive.delay.any()) for r in recordings)
     recordings, servo_notes = with_servo_torques(recordings, robot, uncertainty)
     recordings = [with_lost_torque_marked(checked_numbers(r), moves, robot) for r in recordings]
     recordings, twice = without_copies(recordings)
     progress("smoothing and differentiating the positions")
     band, recordings, smooth, again = comparable(robot, recordings)
-    return Comparison(robot, recordings, smooth, band, servo_notes, twice + again)
+    return Comparison(robot, recordings, smooth, band, servo_notes, twice + again, stated)
 
 
 def comparable(
@@ -102,6 +114,12 @@ def comparable(
         left_out += [f"{smooth[k].source} is left out: {rows[k]} samples below {band.torque:.3g} Hz remain of it, and "
                      f"{settings.FEWEST_ROWS_OF_RECORDING} are needed." for k in short]  # fmt: skip
         recordings = [r for k, r in enumerate(recordings) if k not in short]
+
+
+def _later(recording: Recording, delay: float, lag: float) -> Recording:
+    assert recording.drive is not None
+    drive = dataclasses.replace(recording.drive, delay=recording.drive.delay + delay, lag=lag)
+    return dataclasses.replace(with_torque(recording, drive), torque_lost=recording.torque_lost)
 
 
 def usable_rows(smooth: Sequence[Conditioned], band: Band) -> np.ndarray:

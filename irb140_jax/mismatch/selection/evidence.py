@@ -36,6 +36,8 @@ class Space:
         kinds: What the prior says of kinds of effects.
         lowest, highest: Admissible amplitudes in prior units, padded with -inf and inf, shape (candidates, width).
         weights, least: Weights of the amplitudes in a sum that is bounded from below, and its bound, per candidate.
+        centre: Prior means of the common nuisances in prior units, shape (offset - inertials,): not zero where rows
+            were made with some of them.
     """
 
     joints: tuple[JointGram, ...]
@@ -49,6 +51,7 @@ class Space:
     highest: np.ndarray
     weights: np.ndarray
     least: np.ndarray
+    centre: np.ndarray
 
     @cached_property
     def beside(self) -> Beside:
@@ -129,6 +132,11 @@ class Space:
                 across = at[rows[r]]
                 down = across if c is r else at[columns[c]]
                 H[r[:, None], c] += self.joints[j].at(hyper[j], instrument).left(across, down)
+        if self.centre.any():
+            # A prior mean is a row of its own beside the data: y is the mean there.
+            means, y = np.zeros(self.size + 1), np.arange(self.size + 1) == self.size
+            means[self.inertials : self.offset] = self.centre
+            H += np.outer(means[rows], y[columns]) + np.outer(y[rows], means[columns])
         return H
 
     def with_y(self, columns: np.ndarray) -> np.ndarray:
@@ -141,7 +149,8 @@ class Space:
 
     def constant(self, hyper: Hyper) -> float:
         """What sizes and levels add to the log evidence of any set."""
-        return sum(g.at(s).constant for g, s in zip(self.joints, hyper, strict=True))
+        of_mean = -0.5 * float(self.centre @ self.centre)
+        return of_mean + sum(g.at(s).constant for g, s in zip(self.joints, hyper, strict=True))
 
     def log_evidence(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """Log evidence and prior of a set; -inf where its amplitudes are inadmissible."""

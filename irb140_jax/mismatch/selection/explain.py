@@ -27,11 +27,13 @@ from irb140_jax.mismatch.regression.rows import (
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
 from irb140_jax.mismatch.selection.averages import Site, site_of
+from irb140_jax.mismatch.selection.evidence import Space
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.drive import LAG_WIDTH
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
@@ -48,6 +50,7 @@ def explain(
     sensors: np.ndarray,
     progress: Callable[[str], None] = lambda _: None,
     unproved: Callable[[Explanation], Sequence[Site]] = lambda _: (),
+    later: Callable[[float, float], Sequence[Conditioned]] | None = None,
 ) -> Explanation:
     """Search for what the model leaves out.
 
@@ -60,12 +63,13 @@ def explain(
         sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         progress: Told what is being done.
         unproved: Effects of an explanation that may not be named; the search goes on without them.
+        later: The recordings where commands are taken up so much later [s]; None where that is known.
     """
     progress("rigid body along the recordings")
     along, factor = all_prepared(robot, recordings), inertial_prior_factor(robot, 1.0)
     scales = scales_of(along)
     first = with_proposals(library(robot, effects, scales), along, band, factor, uncertainty, scales)
-    given = _Given(first, scales, band, factor, uncertainty, sensors, progress)
+    given = _Given(first, scales, band, factor, uncertainty, sensors, progress, later)
     start = _Start(1, first, along, [None] * len(along))
     while True:
         ex, last = _explained(given, start)
@@ -85,7 +89,7 @@ class _Given:
     Attributes:
         first: The library before its shapes were refined.
         scales: Sizes of the recordings.
-        band, uncertainty, sensors, progress: See `explain`.
+        band, uncertainty, sensors, progress, later: See `explain`.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
     """
 
@@ -96,6 +100,7 @@ class _Given:
     uncertainty: float
     sensors: np.ndarray
     progress: Callable[[str], None]
+    later: Callable[[float, float], Sequence[Conditioned]] | None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,6 +118,7 @@ class _Start:
         noise: What the last explanation leaves.
         dropped: Effects that were named and then dropped when their shape was refined, each as often as that happened.
         unproved: Effects that may not be named.
+        delay: Of all commands beyond what was given, and lag of all torques [s].
     """
 
     round: int
@@ -125,6 +131,7 @@ class _Start:
     noise: Noise | None = None
     dropped: tuple[Site, ...] = ()
     unproved: tuple[Site, ...] = ()
+    delay: tuple[float, float] = (0.0, 0.0)
 
     def without(self, sites: Sequence[Site]) -> "_Start":
         """The same round, in which some effects are not named."""
@@ -168,6 +175,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     del sums  # hundreds of megabytes, before the search
     first = of_kinds(given.first, lib.effects)
     space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
+    space = dataclasses.replace(space, centre=_centre(space, start))
     sites = [site_of(c) for c in data.candidates]
     barred = [start.dropped.count(site) >= OFTEN or site in start.unproved for site in sites]
     without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
@@ -187,7 +195,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     data = dataclasses.replace(data, stretches=held)
     ex = Explanation(
         lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
-        unproved=start.unproved,
+        unproved=start.unproved, delay=start.delay,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
 
@@ -205,7 +213,8 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     robot, found = ex.lib.robot, fitted(ex.data, ex.posterior(), ex.chosen, given.factor)
     physics = _physics(found)
     better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
-    along = [seen_by(better, r) for r in start.along]
+    delay, known = _timed(given, start, ex)
+    along = [seen_by(better, r) for r in known]
     torques = [torques_of(robot, physics, r, found[0], found[0], i) for i, r in enumerate(along)]
     noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
     coarse = _coarse(ex, noise)
@@ -217,7 +226,27 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     every = with_loose_inertials(start.lib)
     refined = {site_of(every[i]) for i in start.chosen if not start.whole and every[i].effect.shapes.finer}
     lost = refined - _sites(ex.data, ex.chosen)
-    return _Start(turn, lib, along, loads, whole, at, chosen, noise, (*start.dropped, *lost), start.unproved)
+    dropped = (*start.dropped, *lost)
+    return _Start(turn, lib, along, loads, whole, at, chosen, noise, dropped, start.unproved, delay)
+
+
+def _timed(given: _Given, start: _Start, ex: Explanation) -> tuple[tuple[float, float], list[Prepared]]:
+    """Delay of commands and lag of torque, as far as they are to be found, and the recordings made with them."""
+    servo = start.along[0].recording.servo
+    if given.later is None or servo is None:
+        return start.delay, start.along
+    delay = ex.command_delay(servo)[0], ex.torque_lag()
+    both = zip(start.along, given.later(*delay), strict=True)
+    return delay, [dataclasses.replace(a, recording=r) for a, r in both]
+
+
+def _centre(space: Space, start: _Start) -> np.ndarray:
+    """Prior means of the common nuisances, see `Space`: rows are made with the times that were found so far."""
+    out, servo = np.zeros(space.offset - space.inertials), start.along[0].recording.servo
+    if servo is not None and any(start.delay):
+        out[1] = -start.delay[1] / LAG_WIDTH
+        out[-1] = -start.delay[0] / servo.drive.common_delay_width
+    return out
 
 
 def _first_noise(

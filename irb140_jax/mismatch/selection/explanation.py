@@ -20,6 +20,8 @@ from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.falling_friction import Fall
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.screening import gains, near, reshaped
+from irb140_jax.recordings.condition import Commanded
+from irb140_jax.recordings.drive import LAG_WIDTH
 from irb140_jax.recordings.low_pass import Band
 
 
@@ -42,6 +44,7 @@ class Explanation:
         falls: Members that are named because friction certainly falls with speed, whatever its form.
         scaled: Whether one scale of all logged torques is a finding.
         unproved: What the search found and unseen motions speak against: not named.
+        delay: Of all commands beyond what was given, and lag of all torques, by which those of its rows were made [s].
     """
 
     lib: Library
@@ -58,6 +61,7 @@ class Explanation:
     falls: Mapping[int, Fall] = dataclasses.field(default_factory=dict)
     scaled: bool = False
     unproved: tuple[Site, ...] = ()
+    delay: tuple[float, float] = (0.0, 0.0)
 
     @property
     def members(self) -> list[Candidate]:
@@ -146,6 +150,20 @@ class Explanation:
         mean, cov = self.space.posterior(self.chosen, self.hyper)
         at = self.space.inertials
         return settings.GAIN_COMMON * float(mean[at]), settings.GAIN_COMMON * float(np.sqrt(cov[at, at]))
+
+    def command_delay(self, servo: Commanded) -> tuple[float, float]:
+        """Delay of all commands beyond what was given, and its standard deviation [s]; none acts before it is given."""
+        more, unsure = self._common(self.space.offset - 1, servo.drive.common_delay_width)
+        return self.delay[0] + max(more, -float(np.min(servo.drive.delay))), unsure
+
+    def torque_lag(self) -> float:
+        """Lag of all torques behind what commands and positions say [s]; none comes before."""
+        return max(self.delay[1] + self._common(self.space.inertials + 1, LAG_WIDTH)[0], 0.0)
+
+    def _common(self, at: int, width: float) -> tuple[float, float]:
+        """A time that all joints share, from that with which the rows were made, and its standard deviation [s]."""
+        mean, cov = self.space.posterior(self.chosen, self.hyper)
+        return width * float(mean[at]), width * float(np.sqrt(cov[at, at]))
 
     def prediction(self, without: np.ndarray | None = None) -> tuple[Posterior, float, list[np.ndarray]]:
         """What predicts: possible inertials and amplitudes, the torque scale less one, and each joint's own columns.
