@@ -20,7 +20,7 @@ from irb140_jax.recordings.smooth import white_density, without_noise
 CREEPING = 1e-3  # of a joint's highest speed in any recording: slower, what holds it may be dry friction that gives way
 OUTLIER = 10.0  # times what a torque usually differs by from its neighbours: a spike of the log ...
 LONE = 3.0  # ... if as many times what those differ by among themselves
-INEXACT = 0.01  # of a servo's torque, by which its law may differ from the torque that it makes
+INEXACT = 0.1  # of what is not known of a servo's Kp: how far its law may be from the torque that it makes
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,6 +42,11 @@ class Commanded:
     asked_speed: np.ndarray
     own_delay_width: float
     lag_width: float = LAG_WIDTH
+
+    @property
+    def inexact(self) -> np.ndarray:
+        """Share of the torque by which the law of each servo may be wrong, shape (n,)."""
+        return INEXACT * np.nan_to_num(self.drive.kp_width)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -153,7 +158,7 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     q_noise = np.sqrt(0.5 * raw_rate * white)
     servo = _commanded(recording, t, anti_alias, grid) if has_torque else None
     if servo is not None:
-        unsure = np.hypot(unsure, INEXACT * np.abs(filtered(tau, band.low_pass())))
+        unsure = np.hypot(unsure, servo.inexact * np.abs(filtered(tau, band.low_pass())))
     return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken, servo=servo)
 
 

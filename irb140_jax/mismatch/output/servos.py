@@ -13,7 +13,7 @@ from irb140_jax.mismatch.regression.nuisances import FIXED
 from irb140_jax.mismatch.regression.servo import NAMES
 from irb140_jax.mismatch.result import Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
-from irb140_jax.recordings.condition import INEXACT, Commanded, Conditioned
+from irb140_jax.recordings.condition import Commanded, Conditioned
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 
@@ -32,7 +32,7 @@ def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
     for index, rows in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
         c = ex.data.candidates[index]
         torque = [s.torque(ex.data.nuisances + c.columns, w[rows]) for s in ex.data.stretches]
-        if c.slug == "inertials" or np.any(_rms(torque, ex) > INEXACT * logged):
+        if c.slug == "inertials" or np.any(_rms(torque, ex) > servo.inexact * logged):
             kept.append(index)
     return dataclasses.replace(ex, chosen=tuple(kept))
 
