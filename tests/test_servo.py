@@ -103,18 +103,19 @@ def test_a_delay_of_all_commands_is_found_and_its_place_left_open(robot):
     np.testing.assert_allclose(drive_of(made).delay, 0.010, atol=5e-4)
 
 
-@pytest.mark.parametrize(("delay", "lag"), [(0.004, 0.0), (0.0, 0.006)])
-def test_a_late_command_and_a_torque_that_lags_are_told_apart_and_no_physics(robot, delay, lag):
+@pytest.mark.parametrize(("delay", "lag", "stated"), [(0.004, 0.0, False), (0.0, 0.006, False), (0.004, 0.006, True)])
+def test_a_late_command_and_a_torque_that_lags_are_told_apart_and_no_physics(robot, delay, lag, stated):
     friction = 'frictionloss=".4" damping=".13"', 'frictionloss=".2" damping=".02"'
     plant = two_links(shoulder=friction[0], elbow=friction[1], actuators="" if lag else None)
     loops = [closed_loop(plant, seed, delay=delay, lag=lag)[0] for seed in (1, 2)]
     config = DiagnoseConfig(effects=tuple(CATALOGUE[slug] for slug in LIBRARY))
-    result = diagnose(robot, [dataclasses.replace(r, drive=STATED) for r in loops], config)
+    told = dataclasses.replace(STATED, delay=np.full(2, delay * stated))
+    result = diagnose(robot, [dataclasses.replace(r, drive=told) for r in loops], config)
     drive = result.model.drive
     assert drive is not None and abs(drive.lag - lag) < 1e-3
-    np.testing.assert_allclose(drive.delay, delay, atol=1e-3)
+    np.testing.assert_allclose(drive.delay, delay, atol=1e-9 if stated else 1e-3)
     assert {f.effect for f in result.diagnosis.findings} <= {"coulomb_friction", "viscous_friction"}
-    assert any("can't be told from the fit" in note for note in result.diagnosis.notes)
+    assert stated or any("can't be told from the fit" in note for note in result.diagnosis.notes)
 
 
 def test_a_drive_that_lags_gives_the_same_torque_later():

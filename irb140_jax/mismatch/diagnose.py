@@ -138,7 +138,7 @@ def _explained(
     """What the model leaves out, with one scale of all torques where that is probable."""
     scatter, uncertainty = np.hypot(*sensors), config.inertial_uncertainty
     effects = [e for e in config.effects if data.servo is None or not e.place.of_clocks]
-    later = None if data.servo is None or data.delay_stated else lambda *delay: data.later(*delay).smooth
+    later = lambda *times: data.later(*times).smooth  # noqa: E731
     ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved, later)
     ex = without_negligible(ex, data.servo)
     return dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= settings.NAMED)

@@ -108,7 +108,7 @@ def of_servos(ex: Explanation, servo: Commanded | None, found: list[Finding]) ->
     return out
 
 
-def command_notes(ex: Explanation, servo: Commanded, stated: bool) -> list[str]:
+def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     """How late all servos apply their commands, where that is not stated, and a note for every one that differs.
 
     The odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
@@ -116,7 +116,7 @@ def command_notes(ex: Explanation, servo: Commanded, stated: bool) -> list[str]:
     """
     more, unsure = ex.command_delay(servo)
     late, lag = float(np.min(servo.drive.delay)) + more - ex.delay[0], ex.torque_lag() if ex.delay[1] else 0.0
-    out = [] if stated or max(late, lag) < unsure else [
+    out = [] if max(late, lag) < unsure or not servo.drive.common_delay_width else [
         f"Commands of all joints are taken to act {digits(1e3 * late)} +- {digits(1e3 * unsure, 1)} ms after their "
         f"row, and torque to lag {digits(1e3 * lag)} ms more: so the recordings suit the model best. Where the time is "
         "lost can't be told from the fit: whether commands are held from row to row or taken up late, the drive's "

@@ -31,7 +31,6 @@ class Comparison:
         band: Of the comparison.
         servo_notes: What was assumed of servos, a sentence each.
         notes: What was left out or counts only once, a sentence each.
-        delay_stated: Whether it is stated how late commands are taken up.
     """
 
     robot: Robot
@@ -40,7 +39,6 @@ class Comparison:
     band: Band
     servo_notes: list[str]
     notes: list[str]
-    delay_stated: bool = True
 
     @property
     def names(self) -> list[str]:
@@ -81,13 +79,12 @@ def comparison(
         RecordingError: A recording is too short for any filter, or holds what is no number.
     """
     moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
-    stated = any(r.drive is not None and bool(r.drive.delay.any()) for r in recordings)
     recordings, servo_notes = with_servo_torques(recordings, robot, uncertainty)
     recordings = [with_lost_torque_marked(checked_numbers(r), moves, robot) for r in recordings]
     recordings, twice = without_copies(recordings)
     progress("smoothing and differentiating the positions")
     band, recordings, smooth, again = comparable(robot, recordings)
-    return Comparison(robot, recordings, smooth, band, servo_notes, twice + again, stated)
+    return Comparison(robot, recordings, smooth, band, servo_notes, twice + again)
 
 
 def comparable(

@@ -63,7 +63,7 @@ def explain(
         sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         progress: Told what is being done.
         unproved: Effects of an explanation that may not be named; the search goes on without them.
-        later: The recordings where commands are taken up so much later [s]; None where that is known.
+        later: The recordings where commands are taken up so much later, and torque lags so much [s]: of servos alone.
     """
     progress("rigid body along the recordings")
     along, factor = all_prepared(robot, recordings), inertial_prior_factor(robot, 1.0)
@@ -233,7 +233,7 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
 def _timed(given: _Given, start: _Start, ex: Explanation) -> tuple[tuple[float, float], list[Prepared]]:
     """Delay of commands and lag of torque, as far as they are to be found, and the recordings made with them."""
     servo = start.along[0].recording.servo
-    if given.later is None or servo is None:
+    if servo is None or given.later is None:
         return start.delay, start.along
     delay = ex.command_delay(servo)[0], ex.torque_lag()
     both = zip(start.along, given.later(*delay), strict=True)
@@ -243,9 +243,9 @@ def _timed(given: _Given, start: _Start, ex: Explanation) -> tuple[tuple[float, 
 def _centre(space: Space, start: _Start) -> np.ndarray:
     """Prior means of the common nuisances, see `Space`: rows are made with the times that were found so far."""
     out, servo = np.zeros(space.offset - space.inertials), start.along[0].recording.servo
-    if servo is not None and any(start.delay):
-        out[1] = -start.delay[1] / LAG_WIDTH
-        out[-1] = -start.delay[0] / servo.drive.common_delay_width
+    if servo is not None:
+        widths = np.array([servo.drive.common_delay_width, LAG_WIDTH])
+        out[[-1, 1]] = -np.divide(start.delay, widths, out=np.zeros(2), where=widths > 0.0)
     return out
 
 
