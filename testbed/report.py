@@ -16,7 +16,7 @@ from testbed.probes import PROBES
 from testbed.statistics import calibration_error, covered, wilson
 
 ROOT = pathlib.Path(__file__).parents[1]
-LOOKS = ("first", "second", "third", "", "fifth", "sixth")  # labels of the looks at *check*
+LOOKS = ("first", "second", "third", "", "fifth", "sixth", "seventh")  # labels of the looks at *check*
 # Labels of *check* under other conditions, as `testbed.runner` makes them.
 CONDITIONS = {"quiet": "noise and steps of the sensors / 10", "long": "recordings 10 times as long"}
 # Forms of cases of servos in closed loop: what is logged, or known of their gains.

@@ -82,7 +82,7 @@ def unnamed(joints: int = 3, **sizes) -> dict:
         (with_value(0, "band", "rate"), "band"),
         (with_value(1, "band", "unheard_of"), "unheard_of"),
         (without("discrepancy"), "'discrepancy' is missing"),
-        (with_value(unnamed(joints=2), "discrepancy"), "discrepancy has shape (2, 82)"),
+        (with_value(unnamed(joints=2), "discrepancy"), f"discrepancy has shape (2, {FEATURES})"),
         (with_value(unnamed() | {"scales": {}}, "discrepancy"), "missing"),
         (with_value(unnamed(torque=[1.0, 2.0]), "discrepancy"), "torque has shape (2,)"),
         (with_value(unnamed(torque=["nan", 1.0, 1.0]), "discrepancy"), "torque holds what is no number"),
