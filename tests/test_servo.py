@@ -18,7 +18,7 @@ from irb140_jax.cli import main
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import DiagnoseConfig, diagnose, save
-from irb140_jax.recordings import drive_of_model, read_recording, stated_drive, write_recording
+from irb140_jax.recordings import Drive, drive_of_model, read_recording, stated_drive, write_recording
 from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.servo import with_servo_torques, with_torque
 from irb140_jax.report import html_report
@@ -97,7 +97,7 @@ def test_an_unknown_kp_is_estimated_from_the_nominal_inertials_and_said_with_its
     assert any("in units of that Kp only" in note and "would fix the scale" in note for note in notes)
 
 
-def test_a_delay_of_all_commands_is_found_and_its_place_left_open(robot):
+def test_a_delay_of_all_commands_is_estimated_before_the_search(robot):
     recording, _ = closed_loop(two_links(), delay=0.010)
     (made,), _ = with_servo_torques([dataclasses.replace(recording, drive=STATED)], robot, 0.05)
     np.testing.assert_allclose(drive_of(made).delay, 0.010, atol=5e-4)
@@ -114,7 +114,9 @@ def test_a_late_command_and_a_torque_that_lags_are_told_apart_and_no_physics(rob
     drive = result.model.drive
     assert drive is not None and abs(drive.lag - lag) < 1e-3
     np.testing.assert_allclose(drive.delay, delay, atol=1e-9 if stated else 1e-3)
-    assert {f.effect for f in result.diagnosis.findings} <= {"coulomb_friction", "viscous_friction"}
+    found = names(result)
+    assert found >= {("coulomb_friction", joint) for joint in JOINTS}
+    assert {name for name, *_ in found} <= {"coulomb_friction", "viscous_friction"}
     assert stated or any("can't be told from the fit" in note for note in result.diagnosis.notes)
 
 
@@ -122,7 +124,7 @@ def test_a_drive_that_lags_gives_the_same_torque_later():
     recording, _ = closed_loop(two_links(), duration=3.0)
     (now, later) = (with_torque(recording, dataclasses.replace(STATED, lag=lag)).tau for lag in (0.0, 2.0 / 200.0))
     np.testing.assert_allclose(later[2:], now[:-2], atol=1e-9)
-    assert type(STATED).from_json(dataclasses.replace(STATED, lag=0.01).to_json()).lag == 0.01
+    assert Drive.from_json(dataclasses.replace(STATED, lag=0.01).to_json()).lag == 0.01
 
 
 def test_commands_that_are_held_from_row_to_row_act_half_a_row_late(tmp_path):

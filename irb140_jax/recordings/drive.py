@@ -11,10 +11,9 @@ from irb140_jax.recordings.columns import ColumnMap
 from irb140_jax.robot import servos_of
 
 KP_WIDTH, KD_WIDTH = 0.10, 0.05  # relative standard deviation of a stated Kp and Kd
-# s by which all commands may act at another time than the first estimate says: those of 11 simulated arms were off by
-# 1 ms RMS.  Not more, for what a rotor that the model lacks does looks like it.
-COMMON_DELAY_WIDTH = 1e-3
-LAG_WIDTH = 5e-3  # s by which the torque of all servos may come late: a few samples of a bus, or a slow current loop
+# s by which all commands may act at another time than the first estimate says, and by which the torque of all servos
+# may come late: a sample of a controller at 1 kHz, and a few of a slow bus.  Judgements.
+COMMON_DELAY_WIDTH, LAG_WIDTH = 1e-3, 5e-3
 # s and rows by which commands of one joint may act at another time than those of all joints are found to.  Not more:
 # what is explained by a delay that no model holds is missing when the model predicts.
 OWN_DELAY_WIDTH, ROWS_WIDTH = 1e-3, 0.1

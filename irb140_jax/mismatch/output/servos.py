@@ -115,7 +115,7 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     any rare effect.
     """
     more, unsure = ex.command_delay(servo)
-    late, lag = float(np.min(servo.drive.delay)) + more - ex.delay[0], ex.torque_lag() if ex.delay[1] else 0.0
+    late, lag = float(np.min(servo.drive.delay)) + more - ex.delay[0], ex.torque_lag()
     out = [] if max(late, lag) < unsure or not servo.drive.common_delay_width else [
         f"Commands of all joints are taken to act {digits(1e3 * late)} +- {digits(1e3 * unsure, 1)} ms after their "
         f"row, and torque to lag {digits(1e3 * lag)} ms more: so the recordings suit the model best. Where the time is "
