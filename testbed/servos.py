@@ -3,7 +3,8 @@
     case = make_servo("work", 17, "known")
 
 A case comes in four forms of the same motion: "torque" logs what the motors gave; the others log commands, and the
-model has the true gains ("known"), gains that are some 10 % wrong ("wrong") or no servos at all ("unknown").
+model has the true gains ("known"), gains that are some 10 % wrong ("wrong") or no servos at all ("unknown").  Those
+called "laws" hide what a servo itself does: a limit of its torque, a dead band, a motor that gives less at speed.
 """
 
 import dataclasses
@@ -24,7 +25,7 @@ from testbed.motions import PROGRAMMES, STEP, Motion, programme
 from testbed.plants import Hidden, Plant, Sizes, sizes_of
 from testbed.seeds import generator
 
-Form = Literal["torque", "known", "wrong", "unknown"]
+Form = Literal["torque", "known", "wrong", "unknown", "laws"]
 FORMS: tuple[Form, ...] = ("torque", "known", "wrong", "unknown")
 PARTS = 2  # steps of the simulation in one of the log's fine ones
 SETTLE = 1.5  # s before a recording begins, in which the arm sags into its first posture
@@ -42,6 +43,8 @@ class Loop:
         kp, kd: Gains of the servos, shape (n,).
         loss, damping, stiffness, rest: Of MuJoCo's joints, shape (n,).
         second: Joint with a second one between motor and link, the stiffness and damping of that, and its play.
+        dead: Position error below which a servo does nothing, shape (n,).
+        stall, fastest: Torque of a motor at rest, and speed at which it has none left, shape (n,).
         coupled: Two joints, the sign between them and the damping of their relative speed.
         forces: Each makes, for a recording, what acts at every step on a model, its data and the joints' degrees of
             freedom.
@@ -54,6 +57,9 @@ class Loop:
     damping: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     stiffness: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     rest: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    dead: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    stall: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    fastest: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     second: tuple[int, float, float, float] | None = None
     coupled: tuple[int, int, float, float] | None = None
     forces: list[Callable[[int], Callable[[mujoco.MjModel, mujoco.MjData, np.ndarray], None]]] = dataclasses.field(
@@ -63,6 +69,7 @@ class Loop:
     def __post_init__(self) -> None:
         of = (self.loss, self.damping, self.stiffness, self.rest)
         self.loss, self.damping, self.stiffness, self.rest = (x if len(x) else np.zeros(len(self.kp)) for x in of)
+        self.dead, self.stall, self.fastest = np.zeros(len(self.kp)), *np.full((2, len(self.kp)), np.inf)
 
 
 def bodies(
@@ -222,6 +229,25 @@ def shear_thinning(loop, sizes, rng, j, torque):
                  instead=("viscous_friction",))  # fmt: skip
 
 
+def limit(loop, sizes, rng, j, torque):
+    """A motor that is at its limit where most torque is needed."""
+    loop.stall[j] = rng.uniform(1.4, 2.0) * sizes.tau[j]
+    rubbing.hide(loop.plant, "limit", "torque_saturation", j, {"limit": loop.stall[j]}, accept=("back_emf",))
+
+
+def dead_band(loop, sizes, rng, j, torque):
+    """Position errors that are too small for a servo."""
+    loop.dead[j] = rng.uniform(0.1, 0.5) * sizes.tau[j] / loop.kp[j]
+    rubbing.hide(loop.plant, "dead band", "servo_deadband", j, {"width": loop.dead[j]})
+
+
+def voltage(loop, sizes, rng, j, torque):
+    """A motor on a voltage."""
+    loop.stall[j], loop.fastest[j] = rng.uniform(1.6, 2.4) * sizes.tau[j], rng.uniform(2.5, 4.0) * sizes.qd[j]
+    rubbing.hide(loop.plant, "voltage", "back_emf", j, {"stall_torque": loop.stall[j]}, accept=("torque_saturation",))
+
+
+LAWS: dict[str, Callable[..., None]] = {"torque_saturation": limit, "servo_deadband": dead_band, "back_emf": voltage}
 KINDS: dict[str, Callable[..., None]] = {
     "rotor_inertia": partial(bodies, put_in=leaving_out.rotor), "payload": partial(bodies, put_in=leaving_out.payload),
     "gravity_tilt": partial(bodies, put_in=leaving_out.tilt),
@@ -257,7 +283,7 @@ def make_servo(draw: str, index: int, form: Form, commit: str = "") -> Case:
     """A case: a pure function of its draw and its index; its motion is the same in every form."""
     rng, moving, logging = (generator(draw, index, f"servo {s}", commit) for s in ("plant", "motions", "logger"))
     order = generator(draw, index // len(PASS), "servo pass", commit).permutation(len(PASS))
-    kind = PASS[order[index % len(PASS)]]
+    kind = list(LAWS)[index % len(LAWS)] if form == "laws" else PASS[order[index % len(PASS)]]
     nominal = irb140() if rng.random() < 0.4 else random_arm(rng, int(rng.integers(2, 7)))
     error, name = float(rng.choice(ERRORS)), str(rng.choice(list(PROGRAMMES), p=(0.2, 0.5, 0.15, 0.15)))
     unseen = [dataclasses.replace(m, number=100) for m in programme(nominal, moving, "fourier", 8.0)[:1]]
@@ -268,9 +294,9 @@ def make_servo(draw: str, index: int, form: Form, commit: str = "") -> Case:
     kp, kd = inertia * swing**2, 2.0 * damped * inertia * swing
     loop = Loop(Plant(nominal, built(nominal, rng, error)), kp, kd)
     strength = 10.0 ** rng.uniform(-1.5, -0.6)
-    if kind in KINDS:
+    if kind in KINDS or kind in LAWS:
         j = int(rng.integers(n))
-        KINDS[kind](loop, sizes, rng, j, strength * float(sizes.tau[j]))
+        (KINDS | LAWS)[kind](loop, sizes, rng, j, strength * float(sizes.tau[j]))
     if kind != "nothing":
         rubbed(loop, sizes, rng)
     logger = random_logger(logging, nominal.slide, sizes.tau)
@@ -320,6 +346,9 @@ def simulated(loop: Loop, motion: Motion, command: np.ndarray) -> tuple[np.ndarr
             d.qfrc_applied[:] = 0.0
             for act in acting:
                 act(m, d, at)
+            d.ctrl[:] -= np.clip(d.ctrl - d.qpos[at], -loop.dead, loop.dead)
+            slower = d.qvel[at] / loop.fastest
+            m.actuator_forcerange[:] = np.stack([-loop.stall * (1.0 + slower), loop.stall * (1.0 - slower)], axis=1)
             mujoco.mj_step(m, d)
             if part == 0 and i >= 0:
                 out[2, i] = d.actuator_force
@@ -369,6 +398,7 @@ def _model(loop: Loop) -> mujoco.MjModel:
         for k, by in ((j, 1.0), (other, way)):
             ET.SubElement(tendon, "joint", joint=arm.names[k], coef=f"{by:g}")
     m = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+    m.actuator_forcelimited[:] = np.isfinite(loop.stall)
     m.opt.timestep, m.opt.gravity = STEP / PARTS, arm.gravity
     # Damping taken implicitly would not be the servo's law to the step.
     m.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER

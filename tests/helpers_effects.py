@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers import random_robot
 
-from irb140_jax.effects import Motion, RigidBody, Scales
+from irb140_jax.effects import Asked, Motion, RigidBody, Scales
 from irb140_jax.effects.catalogue import CATALOGUE
 
 every_effect = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=CATALOGUE.keys())
@@ -42,7 +42,9 @@ def motion(seed=0, samples=60, rest_speed=RESTING):
     speeds = jnp.full(len(KINDS), rest_speed)
     direction = jnp.tanh(arrays[1] / speeds)
     near_rest = {"rest_speed": speeds, "direction": direction}
-    return Motion(jnp.arange(samples) / 20.0, *arrays, rigid=rigid, **near_rest, recording=jnp.array(0.0))
+    torque, error = (jnp.asarray(x) for x in rng.normal(size=(2, samples, len(KINDS))))
+    asked = Asked(4.0 * torque, error, jnp.asarray(rng.uniform(1.0, 9.0, len(KINDS))))
+    return Motion(jnp.arange(samples) / 20.0, *arrays, rigid=rigid, **near_rest, recording=jnp.array(0.0), asked=asked)
 
 
 def robot():

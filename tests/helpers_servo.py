@@ -26,17 +26,23 @@ def two_links(kp=KP, kd=KD, shoulder="", elbow="", limit=None, actuators=None, g
 </body></body></worldbody><actuator>{own if actuators is None else actuators}</actuator></mujoco>"""
 
 
-def closed_loop(xml, seed=1, duration=16.0, delay=0.0, noise=NOISE, lag=0.0):
+def given(error, qd):
+    """Torque that servos give at an error (2,) and a speed (2,): their law."""
+    return np.array(KP) * error - np.array(KD) * qd
+
+
+def closed_loop(xml, seed=1, duration=16.0, delay=0.0, noise=NOISE, lag=0.0, law=None):
     """A recording of commands and positions, and the torque that MuJoCo's actuators gave, (T, 2) [N m].
 
-    Commands act `delay` late [s].  With a lag [s] there are no actuators: torque by their law comes so much later.
+    Commands act `delay` late [s].  With a lag [s] or a law like `given` there are no actuators: torque by that law
+    comes so much later.
     """
     rng = np.random.default_rng(seed)
     t = np.arange(round(duration / STEP)) * STEP
     waves = [(rng.uniform(0.1, 0.35), rng.uniform(0.15, 1.6), rng.uniform(0.0, 6.0)) for _ in range(10)]
     wave = lambda k: sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in waves[5 * k : 5 * k + 5])  # noqa: E731
     command = np.stack([wave(0), wave(1)], axis=1)
-    return _logged(xml, t, command, rng, seed, noise, late=round(delay / STEP), lag=round(lag / STEP))
+    return _logged(xml, t, command, rng, seed, noise, late=round(delay / STEP), lag=round(lag / STEP), law=law)
 
 
 def to_and_fro(xml, pushed, seed=1, noise=2e-5):
@@ -59,18 +65,18 @@ def to_and_fro(xml, pushed, seed=1, noise=2e-5):
     return _logged(xml, t, command, rng, seed, noise, push=push)
 
 
-def _logged(xml, t, command, rng, seed, noise, late=0, push=None, lag=0):
+def _logged(xml, t, command, rng, seed, noise, late=0, push=None, lag=0, law=None):
     model = mujoco.MjModel.from_xml_string(xml)
     data, q, torque = mujoco.MjData(model), np.empty_like(command), np.empty_like(command)
     data.qpos[:], made = command[0], []
     for i in range(len(t)):
         q[i], wanted = data.qpos, command[max(i - late, 0)]
-        made.append(np.array(KP) * (wanted - data.qpos) - np.array(KD) * data.qvel)
-        data.qfrc_applied[:] = made[max(i - lag, 0)] if lag else 0.0
+        made.append((law or given)(wanted - data.qpos, data.qvel))
+        data.qfrc_applied[:] = made[max(i - lag, 0)] if lag or law else 0.0
         data.qfrc_applied[:] += 0.0 if push is None else push[i]
         data.ctrl[:] = wanted if model.nu else ()
         mujoco.mj_step(model, data)
-        torque[i] = made[max(i - lag, 0)] if lag else data.qfrc_actuator
+        torque[i] = made[max(i - lag, 0)] if lag or law else data.qfrc_actuator
     rows = slice(round(0.5 / STEP), None, round(1.0 / RATE / STEP))
     q = q[rows] + noise * rng.normal(size=q[rows].shape)
     recording = Recording(

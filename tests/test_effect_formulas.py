@@ -121,6 +121,14 @@ LAWS_OF_MOTION = {
     "actuator_lag": lambda p, m, j: p["time_constant"] * AT(m.scaled_rate, j),
     "time_delay": lambda p, m, j: shifted(p, m),
     "channel_skew": lambda p, m, j: shifted(p, m)[:, [j]],
+    "torque_saturation": lambda p, m, j: AT(m.asked.torque, j) - np.clip(
+        AT(m.asked.torque, j), -p["limit"], p["limit"]),
+    "servo_deadband": lambda p, m, j: float(m.asked.kp[j]) * np.where(
+        np.abs(AT(m.asked.error, j)) < p["width"], AT(m.asked.error, j), p["width"] * np.sign(AT(m.asked.error, j))),
+    "back_emf": lambda p, m, j: np.where(
+        AT(m.asked.torque, j) > 0,
+        np.maximum(AT(m.asked.torque, j) - p["stall_torque"] * np.clip(1 - AT(m.qd, j) / p["no_load_speed"], 0, 2), 0),
+        np.minimum(AT(m.asked.torque, j) + p["stall_torque"] * np.clip(1 + AT(m.qd, j) / p["no_load_speed"], 0, 2), 0)),
     "gravity_spring": lambda p, m, j: p["stiffness"] * (AT(m.q, j) - p["rest"]),
     "gravity_tilt": lambda p, m, j: p["tilt"] * float(m.rigid.gravity) * (m.rigid.by_gravity @ m.rigid.across[0]),
     "payload": lambda p, m, j: p["mass"] * np.asarray(m.rigid.held)[:, :, 0],

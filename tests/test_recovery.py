@@ -44,6 +44,9 @@ HIDDEN_ON = {
 }
 NOT_ON_THIS_MACHINE = {
     "channel_skew": "MuJoCo has one clock: it is hidden below",
+    "torque_saturation": "of servos: see tests/test_servo_laws.py",
+    "servo_deadband": "of servos: see tests/test_servo_laws.py",
+    "back_emf": "of servos: see tests/test_servo_laws.py",
     "payload": "its weight is within what the last link's own inertials may err by",
     "encoder_offset": "gravity has no slope on any of its joints",
     "joint_elasticity": "no softer than 8 Hz, it is a hundredth of the torque",

@@ -8,7 +8,7 @@ from testbed.arms import built, irb140, random_arm
 from testbed.motions import STEP, fourier
 from testbed.plants import Plant, sizes_of
 from testbed.scoring import stated_classes
-from testbed.servos import FORMS, KINDS, Loop, make_servo, simulated
+from testbed.servos import FORMS, KINDS, LAWS, Loop, make_servo, simulated
 
 
 def loop_of(arm, rng):
@@ -62,14 +62,14 @@ def test_a_stiff_second_joint_is_none_and_a_soft_one_is_seen():
     assert np.abs(stiff - none).max() < 0.1 * np.abs(soft - none).max()
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("kind", sorted(KINDS | LAWS))
 def test_every_kind_moves_otherwise_and_says_what_is_true(kind):
     rng = np.random.default_rng(6)
     arm = random_arm(rng, 3)
     loop, sizes = loop_of(arm, rng)
     motion = fourier(arm, rng, 2.0)
     bare = simulated(loop, motion, motion.q)[2]
-    KINDS[kind](loop, sizes, rng, 1, 0.2 * float(sizes.tau[1]))
+    (KINDS | LAWS)[kind](loop, sizes, rng, 1, 0.2 * float(sizes.tau[1]))
     assert loop.plant.hidden and loop.plant.hidden[-1].accept
     with_it = simulated(loop, motion, motion.q)[2]
     assert np.isfinite(with_it).all()

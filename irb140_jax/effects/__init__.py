@@ -3,6 +3,7 @@
 from irb140_jax.effects.base import Effect as Effect
 from irb140_jax.effects.grids import Scales as Scales
 from irb140_jax.effects.left_over import LeftOver as LeftOver
+from irb140_jax.effects.motion import Asked as Asked
 from irb140_jax.effects.motion import Motion as Motion
 from irb140_jax.effects.motion import RigidBody as RigidBody
 from irb140_jax.effects.records import At as At

@@ -56,7 +56,8 @@ class Effect:
             f"bounds for each of the law's {law.width} columns, or none": all(
                 len(x) in (0, law.width) for x in (prior.lowest, prior.highest)),
             "a proportion for each of the law's own columns, or none": len(prior.proportion) in (0, len(law.own)),
-            "`to_log` in laws of the log and in no others": (law.to_log is not None) == self.place.at.in_log,
+            "`to_log` in laws of the log and in no others": (law.to_log is not None) == self.place.at.of_any_torque,
+            "`silent` in laws of servos and in no others": (law.silent is not None) == self.place.of_servos,
             "`from_physical` where there is `to_physical`": law.to_physical is None or law.from_physical is not None,
             "`around` where there is `scan`": (shapes.scan is None) == (shapes.around is None),
             "`at_shape` where a shape `follows`": shapes.follows is None or prior.at_shape is not None,

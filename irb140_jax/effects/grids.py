@@ -18,19 +18,20 @@ class Scales(NamedTuple):
     q_noise: np.ndarray  # standard deviation of the encoders' white noise [rad or m]
 
 
-def between_neighbours(grid: np.ndarray, best: np.ndarray, *, beyond: bool = False) -> np.ndarray:
-    """As many grid points of one parameter, in equal ratios, between the neighbours of the best, shape (points, 1).
+def between_neighbours(grid: np.ndarray, best: np.ndarray, *, beyond: int = 0, reach: int = 1) -> np.ndarray:
+    """As many grid points of one parameter, in equal ratios, between neighbours of the best, shape (points, 1).
 
     Args:
         grid: As it was, shape (points, 1).
         best: Its best point, shape (1,).
-        beyond: Whether an end of the grid has a neighbour outside of it.
+        beyond: How many neighbours an end of the grid has outside of it.
+        reach: Which neighbours: the next ones, or the ones after those.
     """
     values = np.sort(grid[:, 0])
-    if beyond:
+    for _ in range(beyond):
         values = np.array([values[0] ** 2 / values[1], *values, values[-1] ** 2 / values[-2]])
     at = int(np.argmin(np.abs(values - best[0])))
-    return np.geomspace(values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)], len(grid))[:, None]
+    return np.geomspace(values[max(at - reach, 0)], values[min(at + reach, len(values) - 1)], len(grid))[:, None]
 
 
 def top_of_parabola(low: float, middle: float, high: float) -> float:

@@ -34,6 +34,20 @@ class RigidBody(eqx.Module):
     tool_jacobian: Float[Array, "T n 3"]
 
 
+class Asked(eqx.Module):
+    """What position servos were asked for: by their law, whatever they gave.
+
+    Attributes:
+        torque: Kp (qdes - q) + Kd (qddes - qd) [N m or N], shape (T, n).
+        error: qdes - q [rad or m], shape (T, n).
+        kp: Gains [N m/rad or N/m], shape (n,).
+    """
+
+    torque: JointSamples
+    error: JointSamples
+    kp: Joints
+
+
 class Motion(eqx.Module):
     """What an effect may look at: a motion and the torque the model transmits along it.
 
@@ -49,6 +63,7 @@ class Motion(eqx.Module):
         direction: sign(qd), and between two signs what friction does while a joint sticks, shape (T, n).
         recording: Number of the recording, from 0; below 0 for motion that the diagnosis did not see, shape ().
         turned: Positions at which the joints turned round before the first sample, the last one last, shape (K, n).
+        asked: Of servos, where their commands are known.
     """
 
     t: Samples
@@ -64,6 +79,7 @@ class Motion(eqx.Module):
     direction: JointSamples
     recording: Scalar
     turned: Float[Array, "K n"] | None = None
+    asked: Asked | None = None
 
 
 def of_site(array: JointSamples, joints: Int[Array, " m"]) -> Float[Array, "T m"]:

@@ -23,7 +23,7 @@ def _grid(scales, joints):
 
 def _finer(grid, best):
     # Of a law that bends more than any on the grid, dry or viscous friction would be left over.
-    return between_neighbours(grid, best, beyond=True)
+    return between_neighbours(grid, best, beyond=1)
 
 
 def _where(values, units):

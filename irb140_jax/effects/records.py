@@ -14,8 +14,9 @@ import numpy as np
 
 from irb140_jax.effects.grids import Scales
 from irb140_jax.effects.left_over import LeftOver
-from irb140_jax.effects.motion import Motion
+from irb140_jax.effects.motion import Asked, Motion
 from irb140_jax.robot import Robot
+from irb140_jax.robot.drive import ServoGains
 
 Values = dict[str, float]
 
@@ -49,6 +50,8 @@ class Law:
         contains: Slugs of laws that are special cases of this one: they compete.
         falls: Whether its name is that of any friction that falls as the speed rises, whatever the form of the fall.
         absorbs: Whether the law and a special case side by side are again the law, so that they never stand so.
+        silent: Of a law of servos: from what one is asked for, its speed (T, 1) and shape (s,) to where that may be
+            anything beside the torque given, (T, 1), and how much torque that is: a range.
         to_log: Of a law of the log: from any torques x (T, any), the time between samples [s], w (k,) and shape (s,)
             to what the log shows beside x, (T, any).
     """
@@ -64,6 +67,7 @@ class Law:
     contains: tuple[str, ...] = ()
     falls: bool = False
     absorbs: bool = True
+    silent: Callable[[Asked, np.ndarray, np.ndarray], tuple[np.ndarray, float]] | None = None
     to_log: Callable[[np.ndarray, float, np.ndarray, np.ndarray], np.ndarray] | None = None
 
     @property
@@ -90,10 +94,16 @@ class At(enum.Enum):
     FRICTION = "it rubs inside the transmission: it is no part of the load that the transmission carries"
     LOG_SCALE = "in the log: it scales the torque"
     LOG_TIMING = "in the log: it shifts in time what is scaled; there is one at a joint"
+    ASKED = "in what a servo was asked for: the motor never gave it"
 
     @property
     def in_log(self) -> bool:
         """Whether only the log shows it."""
+        return self in (At.LOG_SCALE, At.LOG_TIMING, At.ASKED)
+
+    @property
+    def of_any_torque(self) -> bool:
+        """Whether it is what the log makes of any torque."""
         return self in (At.LOG_SCALE, At.LOG_TIMING)
 
 
@@ -116,12 +126,18 @@ class Place:
         sites: Groups of joints at which it can act, (sites, m).
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
         of_clocks: It is an error of the torque channel's clock: torque made of commands and positions has none.
+        of_servos: It is a law of position servos: of logs of commands alone.
     """
 
     at: At = At.LINKS
     sites: Callable[[Robot], np.ndarray] = each_joint
     everywhere: bool = False
     of_clocks: bool = False
+    of_servos: bool = False
+
+    def is_in(self, *, servo: bool) -> bool:
+        """Whether there can be such an effect in logs of commands, or in logs of torque."""
+        return not (self.of_clocks if servo else self.of_servos)
 
     @property
     def is_friction(self) -> bool:
@@ -240,6 +256,7 @@ class Export:
         not_in_mjcf: What of it MJCF can't express and why, one sentence without its full stop; "" where nothing is.
         in_model: From a robot, the site, all amplitudes (k,) and the shape (s,) to the robot with as much of the effect
             in its own numbers as those, and so MJCF, can hold.
+        in_servo: The same of gains and limits of the position servos that corrected.xml has where commands are logged.
         history: Why its torque depends on more than the present state, as the rest of a sentence, or None.
         memory: What it remembers after standing still at positions (m,) under the torque (m,) of the drives.
         step: One step of a simulation, for effects with a history: from the memory, positions (m,), the torque that
@@ -250,6 +267,7 @@ class Export:
     mjcf: str | None = None
     not_in_mjcf: str = ""
     in_model: Callable[[Robot, tuple[int, ...], np.ndarray, np.ndarray], Robot] | None = None
+    in_servo: Callable[[ServoGains, tuple[int, ...], np.ndarray, np.ndarray], ServoGains] | None = None
     history: str | None = None
     memory: Callable[[jax.Array, jax.Array], jax.Array] | None = None
     step: Callable[..., tuple[jax.Array, jax.Array, jax.Array]] | None = None

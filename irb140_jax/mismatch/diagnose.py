@@ -12,6 +12,7 @@ from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.corrected.drives import with_drives
 from irb140_jax.mismatch.corrected.fitted import discrepancy_carried, fitted_model
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file
@@ -102,17 +103,17 @@ def _diagnosed(
         return _nothing_compared(data, config, reason)
     sensors = scatter_by_sensor(robot, data.recordings, data.smooth, data.band)
     ex = _explained(data, sensors, config, progress)
-    data = data.later(*ex.delay) if any(ex.delay) else data
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
     proof = held_out(ex, refit)
     progress("looking for structure that no effect explains")
     rest, found = unexplained(ex, proof), findings(robot, ex)
-    model, proof, harmful, by_laws = _corrected(data, ex, refit, proof, config)
+    stated = data.servo
+    data, model, proof, harmful, by_laws = _corrected(data, ex, refit, proof, config)
     beyond = beyond_file(model, data.smooth, by_laws)
     matters = reference(ex.lib, ex.scales, data.band.rate)
     seen = visibility(ex, matters)
-    of = Found(data, config.inertial_uncertainty, sensors, ex, proof, found, rest, seen, model, harmful, beyond)
+    of = Found(data, config.inertial_uncertainty, sensors, ex, proof, found, rest, seen, model, harmful, beyond, stated)
     diagnosis = document(of, provenance(robot, data.recordings, config.options, config.words))
     open_ = undecided(ex, found, seen, matters, data.band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
@@ -125,11 +126,17 @@ def _nothing_compared(data: Comparison, config: DiagnoseConfig, reason: str) -> 
     robot, smooth, band, uncertainty = data.robot, data.smooth, data.band, config.inertial_uncertainty
     phi, rest_speed = np.asarray(robot.phi), np.max([r.rest_speed for r in smooth], axis=0)
     model = CorrectedModel(robot, phi, phi, (), band, rest_speed, config.known_joints or robot.joint_names)
-    questions, seen = all_open(robot, config.effects, smooth, band, uncertainty)
+    effects = _searched(config, data)
+    questions, seen = all_open(robot, effects, smooth, band, uncertainty)
     origin = provenance(robot, data.recordings, config.options, config.words)
-    diagnosis = document_of_nothing(data, reason, seen, config.effects, uncertainty, origin)
+    diagnosis = document_of_nothing(data, reason, seen, effects, uncertainty, origin)
     views = Views(robot.joint_names, tuple(data.names), notes=diagnosis.notes)
     return Result(diagnosis, model, views, questions)
+
+
+def _searched(config: DiagnoseConfig, data: Comparison) -> tuple[Effect, ...]:
+    """The effects that there can be in logs of this kind."""
+    return tuple(e for e in config.effects if e.place.is_in(servo=data.servo is not None))
 
 
 def _explained(
@@ -137,8 +144,8 @@ def _explained(
 ) -> Explanation:
     """What the model leaves out, with one scale of all torques where that is probable."""
     scatter, uncertainty = np.hypot(*sensors), config.inertial_uncertainty
-    effects = [e for e in config.effects if data.servo is None or not e.place.of_clocks]
     later = lambda *times: data.later(*times).smooth  # noqa: E731
+    effects = _searched(config, data)
     ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved, later)
     ex = without_negligible(ex, data.servo)
     return dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= settings.NAMED)
@@ -146,24 +153,30 @@ def _explained(
 
 def _corrected(
     data: Comparison, ex: Explanation, refit: Refit, proof: HeldOut, config: DiagnoseConfig
-) -> tuple[CorrectedModel, HeldOut, np.ndarray, list[np.ndarray]]:
+) -> tuple[Comparison, CorrectedModel, HeldOut, np.ndarray, list[np.ndarray]]:
     """The corrected model, with the discrepancy where that helps on unseen motions.
 
     Returns:
-        The model; its errors on unseen data; joints of servos whose discrepancy is left out of both because it makes
-        the error larger, shape (n,); and the model's torque without any discrepancy along each recording, (T, n).
+        The recordings, those of commands with the torque of the drives that were found; the model; its errors on unseen
+        data; joints of servos whose discrepancy is left out of both because it makes the error larger, shape (n,); and
+        the model's torque without any discrepancy along each recording, (T, n).
     """
     post, scale, own = ex.prediction()
-    laws = dataclasses.replace(
+    model = dataclasses.replace(
         fitted_model(ex, refit.posterior(), refit.loose, post, scale, data.band),
-        known_joints=config.known_joints or data.robot.joint_names, drive=data.recordings[0].drive,
-    )  # fmt: skip
-    by_laws = [torques_along(laws, r).corrected for r in data.smooth]
+        known_joints=config.known_joints or data.robot.joint_names,
+    )
+    by_laws = [torques_along(model, r).corrected for r in data.smooth]
     # The errors that are told are those of the model that predicts, not of its linearisation.
     proof = proof.as_predicted(ex.beyond_columns(post, scale, by_laws, data.band))
     discrepancy, harmful = discrepancy_carried(ex, own, proof.carried), np.zeros(data.robot.n, dtype=bool)
+    if data.servo is not None:
+        model, off = with_drives(model, data.servo, ex.of_drives(own))
+        data = data.later(ex.delay[0] + off.delay, ex.delay[1], off.kd)
+        model = dataclasses.replace(model, drive=data.recordings[0].drive)
+        by_laws = [torques_along(model, r).corrected for r in data.smooth]
     if data.servo is not None and discrepancy is not None:
         without = [data.band.apply(torque) for torque in by_laws]
-        harmful = harmful_discrepancy(dataclasses.replace(laws, discrepancy=discrepancy), data.smooth, without)
+        harmful = harmful_discrepancy(dataclasses.replace(model, discrepancy=discrepancy), data.smooth, without)
         discrepancy, proof = discrepancy.on(~harmful), proof.without_discrepancy(harmful)
-    return dataclasses.replace(laws, discrepancy=discrepancy), proof, harmful, by_laws
+    return data, dataclasses.replace(model, discrepancy=discrepancy), proof, harmful, by_laws

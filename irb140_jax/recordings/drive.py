@@ -10,7 +10,7 @@ from irb140_jax.errors import RecordingError
 from irb140_jax.recordings.columns import ColumnMap
 from irb140_jax.robot import servos_of
 
-KP_WIDTH, KD_WIDTH = 0.10, 0.05  # relative standard deviation of a stated Kp and Kd
+GAIN_WIDTH = 0.10  # relative standard deviation of a stated Kp or Kd: of a torque constant that nobody measured
 # s by which all commands may act at another time than the first estimate says, and by which the torque of all servos
 # may come late: a sample of a controller at 1 kHz, and a few of a slow bus.  Judgements.
 COMMON_DELAY_WIDTH, LAG_WIDTH = 1e-3, 5e-3
@@ -55,6 +55,17 @@ class Drive:
         word = lambda x: x if np.isfinite(x) else str(x)  # noqa: E731
         lists = {name: [word(x) for x in getattr(self, name).tolist()] for name in ARRAYS}
         return {**lists, "said": list(self.said), "lag": self.lag}
+
+    def found(self, delay: float | np.ndarray, lag: float, kd: float | np.ndarray = 0.0) -> "Drive":
+        """The drive as a fit found it.
+
+        Args:
+            delay: By how much commands are taken up later than stated [s], of all or by joint.
+            lag: Of all torques [s].
+            kd: Real less stated Kd in standard deviations, of all or by joint.
+        """
+        damping = np.maximum(self.kd + kd * self.kd_width, 0.0)
+        return dataclasses.replace(self, delay=self.delay + delay, lag=lag, kd=damping)
 
     @staticmethod
     def from_json(data: dict[str, Any]) -> "Drive":
@@ -128,6 +139,6 @@ def drive_of_map(columns: ColumnMap, joints: tuple[str, ...], otherwise: Drive |
 
 def _with_widths(drive: Drive) -> Drive:
     """The drives with the widths that stated gains are taken to have."""
-    kp_width = np.where(np.isnan(drive.kp), 0.0, KP_WIDTH)
-    kd_width = np.where(np.isnan(drive.kd), 0.0, KD_WIDTH * np.abs(drive.kd))
+    kp_width = np.where(np.isnan(drive.kp), 0.0, GAIN_WIDTH)
+    kd_width = np.where(np.isnan(drive.kd), 0.0, GAIN_WIDTH * np.abs(drive.kd))
     return dataclasses.replace(drive, kp_width=kp_width, kd_width=kd_width)

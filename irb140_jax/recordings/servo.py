@@ -13,7 +13,7 @@ import numpy as np
 from scipy import interpolate
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.drive import COMMON_DELAY_WIDTH, KD_WIDTH, Drive, unknown_drive
+from irb140_jax.recordings.drive import COMMON_DELAY_WIDTH, GAIN_WIDTH, Drive, unknown_drive
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.servo_estimates import (
     KD_UNSTATED_WIDTH,
@@ -126,7 +126,7 @@ def _gain_notes(
         own = np.flatnonzero(said == origin)
         if len(own):
             out.append(f"{head}, by {words}: Kp and Kd of {gains(own)}. Each Kp is taken to be right to "
-                       f"{100 * first.kp_width[own].max():.2g} %, and a stated Kd to {100 * KD_WIDTH:.2g} %")
+                       f"{100 * first.kp_width[own].max():.2g} %, and a stated Kd to {100 * GAIN_WIDTH:.2g} %")
     guessed = np.flatnonzero(said == "estimate")
     if len(guessed):
         each = ", ".join(

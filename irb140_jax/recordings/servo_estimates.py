@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg
 from scipy.optimize import nnls
 
-from irb140_jax.recordings.drive import KD_WIDTH, KP_WIDTH, Drive
+from irb140_jax.recordings.drive import GAIN_WIDTH, Drive
 from irb140_jax.recordings.glance import glance
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.torques import nominal_torques
@@ -138,7 +138,7 @@ def _log_evidence(rows: Rows, uncertainty: float) -> np.ndarray:
     Friction and a rotor are none below zero: without that, a delay has no lower side.  What is left is a function of
     the joint's state, so it is as often independent as the joint turns round.
     """
-    kp, kd, kp_width, kd_width = rows.kp, rows.kd, KP_WIDTH, KD_WIDTH * np.nan_to_num(rows.kd)
+    kp, kd, kp_width, kd_width = rows.kp, rows.kd, GAIN_WIDTH, GAIN_WIDTH * np.nan_to_num(rows.kd)
     vague = bool(np.isnan(kd).any())  # then what goes with speed is no measure of the joint's torque
     if np.isnan(kp).any() or np.isnan(kd).any():
         found = estimated_gains(rows)

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from irb140_jax import dynamics, kinematics
 from irb140_jax.compiler import QUICK
 from irb140_jax.dynamics.chunks import in_chunks
-from irb140_jax.effects import Motion, RigidBody, Scales
+from irb140_jax.effects import Asked, Motion, RigidBody, Scales
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.recordings.condition import Conditioned
@@ -229,6 +229,7 @@ def columns_along(
     r = along.recording
     nominal = along.nominal
     load, total, carried, scaled = loads or (nominal, nominal, nominal - along.motor_side, nominal)
+    error, gains = (r.servo.command - r.q, np.nan_to_num(r.servo.drive.kp)) if r.servo else (r.q, r.q[0])
     per_sample = (r.t, r.q, r.qd, r.qdd, load, total, carried)
     dt = float(r.t[-1] - r.t[0]) / (len(r.t) - 1)
     first, last = (0, len(r.t)) if at is None else (at.start, at.stop)
@@ -240,7 +241,8 @@ def columns_along(
         rate = _padded(_rate(scaled, piece, dt), pad)
         near_rest = r.rest_speed, _padded(r.direction[piece], pad), np.array(float(recording))
         turned = turned_before(r.q, along.turns, start, TURNS)
-        motion = Motion(t - r.began, *moving, rate, rigid, *near_rest, turned)  # pyright: ignore[reportArgumentType, reportCallIssue]: NumPy
+        asked = r.servo and Asked(_padded(r.tau[piece], pad), _padded(error[piece], pad), gains)  # pyright: ignore[reportArgumentType]: NumPy
+        motion = Motion(t - r.began, *moving, rate, rigid, *near_rest, turned, asked)  # pyright: ignore[reportArgumentType, reportCallIssue]: NumPy
         begin, end = max(start + RUN_IN if start else 0, first), min(start + CHUNK - RUN_OUT, last)
         # One program for each effect: of all in one, XLA would evaluate parts again and again.
         effects, column = [_columns(b[0], b[1], b[2], motion) for b in lib.blocks], 0

@@ -165,7 +165,8 @@ def added_up(links: Any, motor_side: Any, parts: Sequence[tuple[At, Any]]) -> tu
     load = links + of[At.LINKS] + of[At.DRIVE]
     total = load + of[At.FRICTION]
     scaled = total + of[At.LOG_SCALE]
-    return Loads(load, total, load - motor_side - of[At.DRIVE], scaled), scaled + of[At.LOG_TIMING]
+    logged = scaled + of[At.LOG_TIMING] + of[At.ASKED]
+    return Loads(load, total, load - motor_side - of[At.DRIVE], scaled), logged
 
 
 def library_of(robot: Robot, effects: Sequence[Named] | Sequence[Candidate]) -> Library:

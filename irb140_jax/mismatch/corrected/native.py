@@ -1,5 +1,6 @@
 """The corrected model as MJCF, as far as MuJoCo expresses the physics natively, and what it can't."""
 
+import dataclasses
 import pathlib
 from collections.abc import Sequence
 
@@ -7,10 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax.mismatch.columns.torques import Named, as_named
-from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.inertials.consistent import consistent, is_body, of_bodies_or_nominal
 from irb140_jax.oracle.mujoco import inverse_dynamics_along, oracle_model
 from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.drive import Drive
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
 from irb140_jax.robot.drive import ServoGains
@@ -44,8 +46,17 @@ def _servos(model: CorrectedModel, native: Robot) -> ServoGains | None:
     """Servos of the file: with the torque constants found wrong, their gains are those of the torque on the joints."""
     if model.drive is None:
         return None
-    d, gear = model.drive, np.asarray(native.gear) / np.asarray(model.robot.gear)
+    d, gear = limited(model, model.drive), np.asarray(native.gear) / np.asarray(model.robot.gear)
     return ServoGains(gear * d.kp, gear * d.kd, gear * d.limit, d.low, d.high)
+
+
+def limited(model: CorrectedModel, drive: Drive) -> Drive:
+    """A drive with what was found of servos, as far as gains and limits can hold it."""
+    gains = ServoGains(drive.kp, drive.kd, drive.limit, drive.low, drive.high)
+    for n in model.named:
+        if n.effect.export.in_servo:
+            gains = n.effect.export.in_servo(gains, n.joints, n.all_amplitudes(), n.shape)
+    return dataclasses.replace(drive, **gains._asdict())
 
 
 def beyond_file(
@@ -63,7 +74,11 @@ def beyond_file(
     Returns:
         The difference along each; None where MuJoCo has other joints than the model.
     """
-    robot = native_robot(model)
+    robot, others = native_robot(model), tuple(n for n in model.named if not n.effect.export.in_servo)
+    if len(others) < len(model.named):
+        # What the file's servos hold, they are asked for and don't give, as in the model.
+        bare = dataclasses.replace(model, named=others, discrepancy=None)
+        torques = [torques_along(bare, r).corrected for r in recordings]
     native = oracle_model(robot_mjcf(robot))
     if native.nv != model.robot.n:
         return None

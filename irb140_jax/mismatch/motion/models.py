@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from irb140_jax.mismatch.corrected.model import CorrectedModel
-from irb140_jax.mismatch.corrected.native import native_robot
+from irb140_jax.mismatch.corrected.native import limited, native_robot
 from irb140_jax.mismatch.inertials.consistent import of_bodies_or_nominal
 from irb140_jax.oracle.mujoco import mass_matrix
 from irb140_jax.oracle.rollout import simulated_model
@@ -65,7 +65,9 @@ class Simulated:
         """
         if drive is None:
             return self.compiled[name]
-        out, gear = copy.copy(self.compiled[name]), 1.0 if name in ("nominal", "refit") else self.gear
+        out, gear = copy.copy(self.compiled[name]), 1.0
+        if name not in ("nominal", "refit"):
+            gear, drive = self.gear, limited(self.model, drive)
         kp, kd, limit = gear * np.nan_to_num(drive.kp), gear * np.nan_to_num(drive.kd), gear * drive.limit
         out.actuator_gear[:, 0], out.actuator_gainprm[:, 0] = 1.0, kp
         out.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE

@@ -23,7 +23,7 @@ from irb140_jax.mismatch.output.notes import (
     timing_notes,
     unproved_notes,
 )
-from irb140_jax.mismatch.output.servos import command_notes, harmful_notes, of_servos, servo_sentence
+from irb140_jax.mismatch.output.servos import command_notes, gain_notes, harmful_notes, of_servos, servo_sentence
 from irb140_jax.mismatch.output.summary import open_sentence, summary, verdict
 from irb140_jax.mismatch.records import rounded
 from irb140_jax.mismatch.regression.sensor_noise import coarse_positions
@@ -34,6 +34,7 @@ from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.mismatch.validation.testable import Seen, not_testable
 from irb140_jax.mismatch.validation.undecided_joints import torque_size, undecidable
 from irb140_jax.mismatch.validation.unexplained import Structure
+from irb140_jax.recordings.condition import Commanded
 from irb140_jax.robot import Robot
 
 
@@ -54,6 +55,7 @@ class Found:
         harmful: Joints whose discrepancy is left out because it makes the error larger, shape (n,).
         beyond: What corrected.xml lacks of the model's torque along each recording, (T, n) [N m or N]; None where
             unknown.
+        servo: Commands and drive as they were given, where the recordings held these in place of torque.
     """
 
     data: Comparison
@@ -67,6 +69,7 @@ class Found:
     model: CorrectedModel
     harmful: np.ndarray
     beyond: Sequence[np.ndarray] | None
+    servo: Commanded | None = None
 
 
 def document(of: Found, origin: Provenance) -> Diagnosis:
@@ -74,7 +77,7 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     robot, scatter = of.data.robot, np.hypot(*of.sensors)
     logged = [s.tau for s in of.ex.data.stretches]
     missing = undecidable(robot, of.proof, logged, scatter, of.data.band)
-    found = of_servos(of.ex, of.data.servo, [*of.findings, *torque_scale_finding(robot, of.ex)])
+    found = of_servos(of.ex, of.servo, [*of.findings, *torque_scale_finding(robot, of.ex)])
     fit, shifts = fit_by_joint(robot, of.proof, scatter), link_shifts(robot, of.ex)
     effects = {TORQUE_GAIN.slug: TORQUE_GAIN} | of.ex.lib.effects
     kind = verdict(of.ex, of.proof, found, of.rest, missing)
@@ -155,13 +158,13 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     robot, judged = of.data.robot, of.proof.judged
     gap = None if of.beyond is None else native_gap(of.beyond, of.data.band)
     lacking = list(dict.fromkeys(n.effect.title for n in of.model.named if n.effect.export.not_in_mjcf))
-    servo = of.data.servo
-    clocks = timing_notes(of.ex) if servo is None else command_notes(of.ex, servo)
+    channels = timing_notes(of.ex) if of.servo is None else [
+        *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo)]
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
     return [
         *of.data.servo_notes, *harmful_notes(robot, of.harmful), *open_joints,
         *rest_notes(robot, of.proof, np.hypot(*of.sensors)),
-        *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names), *clocks,
-        *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
+        *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names),
+        *channels, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
         *notes(of.data, of.uncertainty, judged), *gap_notes(robot, gap, torque, lacking),
     ]  # fmt: skip

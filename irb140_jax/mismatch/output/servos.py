@@ -5,13 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from irb140_jax.effects import At
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.records import digits
 from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
 from irb140_jax.mismatch.regression.nuisances import FIXED
 from irb140_jax.mismatch.regression.servo import NAMES
-from irb140_jax.mismatch.result import Finding
+from irb140_jax.mismatch.result import Estimate, Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.recordings.condition import Commanded, Conditioned
 from irb140_jax.recordings.recording import Recording
@@ -104,8 +105,49 @@ def of_servos(ex: Explanation, servo: Commanded | None, found: list[Finding]) ->
                 " This number depends on how late the drive applies its commands, because a delay shifts the torque's "
                 "phase."
             )
-        out.append(dataclasses.replace(f, certain=f.certain + said))
+        out.append(dataclasses.replace(f, certain=f.certain + said, parameters=_by_real_kp(ex, servo, f)))
     return out
+
+
+def _by_real_kp(ex: Explanation, servo: Commanded, f: Finding) -> dict[str, Estimate]:
+    """Parameters of a finding, those that are torques of the stated gains as uncertain as these are.
+
+    The search fits the scale of all torque that links need, with its doubt; friction and limits stand beside it.  Where
+    masses and gains disagree, either may be wrong.
+    """
+    effect, names = ex.lib.effects[f.effect], list(ex.lib.robot.joint_names)
+    if not (effect.place.is_friction or effect.place.at is At.ASKED):
+        return f.parameters
+    doubt = max(float(np.hypot(*kp_scale(ex, servo, names.index(joint)))) for joint in f.joints)
+    of_torque = {p.name for p in effect.law.parameters if p.unit.startswith("{tau}")}
+    return {
+        k: dataclasses.replace(p, std=float(np.hypot(p.std, p.value * doubt)))
+        if k in of_torque and p.value is not None and p.std is not None else p
+        for k, p in f.parameters.items()
+    }  # fmt: skip
+
+
+def kp_scale(ex: Explanation, servo: Commanded, j: int) -> tuple[float, float]:
+    """Stated over real Kp of a joint, less one, and its standard deviation: what the masses of the model say of it."""
+    shared = np.zeros((1, len(ex.space.set_columns(ex.chosen))))
+    shared[0, ex.space.inertials] = settings.GAIN_COMMON
+    width = float(np.hypot(settings.GAIN_JOINT, np.nan_to_num(servo.drive.kp_width[j])))
+    own = width * (np.arange(len(ex.space.joints[j].groups)) == FIXED.index("gain"))[None]
+    mean, cov = ex.space.functions(ex.chosen, ex.hyper, j, shared, own)
+    return float(mean[0]), float(np.sqrt(cov[0, 0]))
+
+
+def gain_notes(ex: Explanation, servo: Commanded) -> list[str]:
+    """What the masses of the model say of the gains."""
+    known = [j for j, said in enumerate(servo.drive.said) if said in ("model", "map")]
+    if not known:
+        return []
+    each = [(ex.lib.robot.joint_names[j], *kp_scale(ex, servo, j)) for j in known]
+    said = ", ".join(f"{name} {100 / (1 + more):.0f} +- {100 * unsure:.0f} %" for name, more, unsure in each)
+    return [
+        f"By the masses of the model Kp is really, in parts of what is stated: {said}. Friction and limits are found "
+        "in torque of the stated gains; the standard deviations of their parameters hold the difference."
+    ]
 
 
 def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
@@ -114,8 +156,8 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     The odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
     any rare effect.
     """
-    more, unsure = ex.command_delay(servo)
-    late, lag = float(np.min(servo.drive.delay)) + more - ex.delay[0], ex.torque_lag()
+    more, unsure = ex.command_delay(servo.drive)
+    late, lag = float(np.min(servo.drive.delay)) + more, ex.torque_lag()
     out = [] if max(late, lag) < unsure or not servo.drive.common_delay_width else [
         f"Commands of all joints are taken to act {digits(1e3 * late)} +- {digits(1e3 * unsure, 1)} ms after their "
         f"row, and torque to lag {digits(1e3 * lag)} ms more: so the recordings suit the model best. Where the time is "

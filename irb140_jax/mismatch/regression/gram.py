@@ -15,7 +15,7 @@ from scipy import linalg
 from scipy.linalg import lapack
 
 from irb140_jax.mismatch import settings
-from irb140_jax.mismatch.regression.nuisances import SCALED
+from irb140_jax.mismatch.regression.nuisances import INSTRUMENT, SCALED
 
 ONE = 24  # index of the level at which the noise is as it was estimated
 LEVELS = tuple(1.25 ** (k - ONE) for k in range(2 * ONE))  # noise over what was estimated
@@ -165,7 +165,8 @@ class JointGram:
 
         Args:
             hyper: Sizes and level.
-            instrument: Whether the instrument may err within its stated widths; otherwise it is taken to be right.
+            instrument: Whether the instrument may err within its stated widths; otherwise it is taken to be right, but
+                for a servo's drive, which is part of the machine.
         """
         key = hyper, instrument
         if key not in self._kept:
@@ -201,7 +202,7 @@ class JointGram:
 
     def _integrated(self, hyper: JointHyper, instrument: bool) -> Integrated:
         level, size, D = LEVELS[hyper[-1]], own_scale(self.groups, hyper), len(self.groups)
-        used = np.flatnonzero((size > 0.0) & (instrument | (self.groups >= 0)))
+        used = np.flatnonzero((size > 0.0) & (instrument | (self.groups != INSTRUMENT)))
         total, rows = self.weighted(level)
         s = size[used]
         M = s[:, None] * total[np.ix_(used, used)] * s / level**2 + np.eye(len(used))
@@ -220,4 +221,4 @@ def _sum(blocks: np.ndarray, weights: np.ndarray) -> np.ndarray:
 def own_scale(groups: np.ndarray, hyper: JointHyper) -> np.ndarray:
     """Prior standard deviation of each own column."""
     sizes = np.array([1.0, *(settings.DISCREPANCY_SIZES[i] for i in hyper[:-1])])
-    return sizes[groups + 1]
+    return sizes[np.maximum(groups, INSTRUMENT) + 1]

@@ -16,6 +16,8 @@ from irb140_jax.robot import Robot
 
 # A joint's own columns with stated widths, in their order; those of a servo come after them.
 FIXED = ("gain", "delay", "rotor", "smoothing", "bias")
+# Groups of columns with stated widths: errors of the instrument, and those of a servo's drive, which models hold.
+INSTRUMENT, DRIVE = -1, -2
 # Blocks of a joint whose size is learned from the recordings.
 SCALED = ("position", "speed", "smooth", "reversal", "slope")
 
@@ -27,7 +29,7 @@ class Nuisances:
     Attributes:
         common: Torque scale, delay and smoothing of all joints, shape (R, n, 3).
         own: Of each joint, fixed widths first, then the blocks `SCALED`; shape (R, D_j) each.
-        groups: Which block each own column belongs to: -1 fixed, else an index into `SCALED`; shape (D_j,) each.
+        groups: Which block each own column belongs to: `INSTRUMENT`, `DRIVE` or an index into `SCALED`; (D_j,) each.
         units: What each own column's feature was multiplied by, shape (D_j,) each.
     """
 
@@ -117,7 +119,8 @@ def nuisances(
             for r in range(count):
                 raw[r][j][block] = raw[r][j][block] * factor
         units.append(np.concatenate(factors))
-        group = np.repeat(np.arange(-1, len(SCALED)), [b.shape[1] for b in raw[0][j]])
+        group = np.repeat(np.arange(INSTRUMENT, len(SCALED)), [b.shape[1] for b in raw[0][j]])
+        group[len(FIXED) : raw[0][j][0].shape[1]] = DRIVE
         for r in range(count):
             out[r][0].append(np.concatenate(raw[r][j], axis=1))
             out[r][1].append(group)

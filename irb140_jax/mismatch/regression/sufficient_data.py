@@ -55,9 +55,9 @@ class Comparison:
         """Low-passed rows in which each joint moves and nothing is lost, over all recordings, shape (n,)."""
         return usable_rows(self.smooth, self.band)
 
-    def later(self, delay: float, lag: float) -> "Comparison":
-        """The same with commands taken up so much later, and torque that lags so much [s]: logs of commands alone."""
-        recordings = [_later(r, delay, lag) for r in self.recordings]
+    def later(self, delay: float | np.ndarray, lag: float, kd: float | np.ndarray = 0.0) -> "Comparison":
+        """The same with the torque of drives as they were found, see `Drive.found`: logs of commands alone."""
+        recordings = [_later(r, delay, lag, kd) for r in self.recordings]
         smooth, _ = with_motions_numbered(conditioned(recordings, self.band), recordings)
         servos = [r.servo and dataclasses.replace(r.servo, lag_width=LAG_WIDTH if lag > 0.0 else 0.0) for r in smooth]
         smooth = [dataclasses.replace(r, servo=servo) for r, servo in zip(smooth, servos, strict=True)]
@@ -113,9 +113,9 @@ def comparable(
         recordings = [r for k, r in enumerate(recordings) if k not in short]
 
 
-def _later(recording: Recording, delay: float, lag: float) -> Recording:
+def _later(recording: Recording, delay: float | np.ndarray, lag: float, kd: float | np.ndarray) -> Recording:
     assert recording.drive is not None
-    drive = dataclasses.replace(recording.drive, delay=recording.drive.delay + delay, lag=lag)
+    drive = recording.drive.found(delay, lag, kd)
     return dataclasses.replace(with_torque(recording, drive), torque_lost=recording.torque_lost)
 
 

@@ -60,8 +60,9 @@ def point(robot: Robot, dphi: np.ndarray, named: Sequence[Named]) -> Point:
     """
     lean = [n for n in named if not np.array_equal(as_named(robot, [n]).gravity, robot.gravity)]
     leaning = eqx.tree_at(lambda r: r.gravity, robot, as_named(robot, lean).gravity) if lean else None
-    log = sorted((n for n in named if n.effect.place.at.in_log), key=lambda n: n.effect.place.at is At.LOG_TIMING)
-    return Point(leaning, dphi, tuple(log), frozenset((n.effect.slug, n.joints) for n in (*lean, *log)))
+    scales, times = ([n for n in named if n.effect.place.at is at] for at in (At.LOG_SCALE, At.LOG_TIMING))
+    log = (*scales, *times)
+    return Point(leaning, dphi, log, frozenset((n.effect.slug, n.joints) for n in (*lean, *log)))
 
 
 def regressor(at: Point, along: Prepared, samples: slice) -> np.ndarray:

@@ -24,6 +24,7 @@ from irb140_jax.mismatch.regression.rows import (
     with_candidates,
     with_library,
 )
+from irb140_jax.mismatch.regression.silent import log_density_lost
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
 from irb140_jax.mismatch.selection.averages import Site, site_of
@@ -33,7 +34,7 @@ from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.recordings.condition import Conditioned
-from irb140_jax.recordings.drive import LAG_WIDTH
+from irb140_jax.recordings.drive import LAG_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
@@ -69,7 +70,8 @@ def explain(
     along, factor = all_prepared(robot, recordings), inertial_prior_factor(robot, 1.0)
     scales = scales_of(along)
     first = with_proposals(library(robot, effects, scales), along, band, factor, uncertainty, scales)
-    given = _Given(first, scales, band, factor, uncertainty, sensors, progress, later)
+    drive = recordings[0].servo and recordings[0].servo.drive
+    given = _Given(first, scales, band, factor, uncertainty, sensors, progress, later, drive)
     start = _Start(1, first, along, [None] * len(along))
     while True:
         ex, last = _explained(given, start)
@@ -91,6 +93,7 @@ class _Given:
         scales: Sizes of the recordings.
         band, uncertainty, sensors, progress, later: See `explain`.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
+        drive: Of the servos as it was given, where there are any.
     """
 
     first: Library
@@ -101,6 +104,7 @@ class _Given:
     sensors: np.ndarray
     progress: Callable[[str], None]
     later: Callable[[float, float], Sequence[Conditioned]] | None
+    drive: Drive | None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,7 +179,9 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     del sums  # hundreds of megabytes, before the search
     first = of_kinds(given.first, lib.effects)
     space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
-    space = dataclasses.replace(space, centre=_centre(space, start))
+    silent = log_density_lost(data.candidates, [r.recording for r in start.along], joints, noise)
+    centre = _centre(space, given.drive, start.delay)
+    space = dataclasses.replace(space, centre=centre, log_prior=space.log_prior + silent)
     sites = [site_of(c) for c in data.candidates]
     barred = [start.dropped.count(site) >= OFTEN or site in start.unproved for site in sites]
     without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
@@ -213,7 +219,10 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     robot, found = ex.lib.robot, fitted(ex.data, ex.posterior(), ex.chosen, given.factor)
     physics = _physics(found)
     better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
-    delay, known = _timed(given, start, ex)
+    delay, known = start.delay, start.along
+    if given.later is not None and given.drive is not None:
+        delay = ex.command_delay(given.drive)[0], ex.torque_lag()
+        known = [dataclasses.replace(a, recording=r) for a, r in zip(known, given.later(*delay), strict=True)]
     along = [seen_by(better, r) for r in known]
     torques = [torques_of(robot, physics, r, found[0], found[0], i) for i, r in enumerate(along)]
     noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
@@ -230,22 +239,12 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     return _Start(turn, lib, along, loads, whole, at, chosen, noise, dropped, start.unproved, delay)
 
 
-def _timed(given: _Given, start: _Start, ex: Explanation) -> tuple[tuple[float, float], list[Prepared]]:
-    """Delay of commands and lag of torque, as far as they are to be found, and the recordings made with them."""
-    servo = start.along[0].recording.servo
-    if servo is None or given.later is None:
-        return start.delay, start.along
-    delay = ex.command_delay(servo)[0], ex.torque_lag()
-    both = zip(start.along, given.later(*delay), strict=True)
-    return delay, [dataclasses.replace(a, recording=r) for a, r in both]
-
-
-def _centre(space: Space, start: _Start) -> np.ndarray:
+def _centre(space: Space, drive: Drive | None, delay: tuple[float, float]) -> np.ndarray:
     """Prior means of the common nuisances, see `Space`: rows are made with the times that were found so far."""
-    out, servo = np.zeros(space.offset - space.inertials), start.along[0].recording.servo
-    if servo is not None:
-        widths = np.array([servo.drive.common_delay_width, LAG_WIDTH])
-        out[[-1, 1]] = -np.divide(start.delay, widths, out=np.zeros(2), where=widths > 0.0)
+    out = np.zeros(space.offset - space.inertials)
+    if drive is not None:
+        widths = np.array([drive.common_delay_width, LAG_WIDTH])
+        out[[-1, 1]] = -np.divide(delay, widths, out=np.zeros(2), where=widths > 0.0)
     return out
 
 

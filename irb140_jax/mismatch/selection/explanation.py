@@ -14,14 +14,13 @@ from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gaussian import Posterior
 from irb140_jax.mismatch.regression.gram import LEVELS
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import Nuisances
+from irb140_jax.mismatch.regression.nuisances import DRIVE, Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.falling_friction import Fall
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.screening import gains, near, reshaped
-from irb140_jax.recordings.condition import Commanded
-from irb140_jax.recordings.drive import LAG_WIDTH
+from irb140_jax.recordings.drive import LAG_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band
 
 
@@ -118,7 +117,7 @@ class Explanation:
             chosen: Which candidates, by default those that are named.
             without: Which blocks of the data are left out, shape (blocks,).
             instrument: Whether the instrument may err within its stated widths.  For predictions it is taken to be
-                right but for what is named.
+                right but for what is named, and for the drive of a servo.
         """
         chosen = self.chosen if chosen is None else chosen
         space = self.space if without is None else self.by_block.without(without)
@@ -151,10 +150,10 @@ class Explanation:
         at = self.space.inertials
         return settings.GAIN_COMMON * float(mean[at]), settings.GAIN_COMMON * float(np.sqrt(cov[at, at]))
 
-    def command_delay(self, servo: Commanded) -> tuple[float, float]:
+    def command_delay(self, stated: Drive) -> tuple[float, float]:
         """Delay of all commands beyond what was given, and its standard deviation [s]; none acts before it is given."""
-        more, unsure = self._common(self.space.offset - 1, servo.drive.common_delay_width)
-        return self.delay[0] + max(more, -float(np.min(servo.drive.delay))), unsure
+        more, unsure = self._common(self.space.offset - 1, stated.common_delay_width)
+        return max(self.delay[0] + more, -float(np.min(stated.delay))), unsure
 
     def torque_lag(self) -> float:
         """Lag of all torques behind what commands and positions say [s]; none comes before."""
@@ -168,6 +167,8 @@ class Explanation:
     def prediction(self, without: np.ndarray | None = None) -> tuple[Posterior, float, list[np.ndarray]]:
         """What predicts: possible inertials and amplitudes, the torque scale less one, and each joint's own columns.
 
+        The latter are the discrepancy and, of a servo, what its drive is off by.
+
         Args:
             without: Which blocks of the data are left out, shape (blocks,).
         """
@@ -179,6 +180,10 @@ class Explanation:
         keep = np.r_[0 : space.inertials, space.offset : len(mean)]
         post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
         return post, settings.GAIN_COMMON * float(mean[space.inertials]), own
+
+    def of_drives(self, own: list[np.ndarray]) -> np.ndarray:
+        """What each drive is off by, from the own columns of a `prediction`, in standard deviations, (n, 2 or 0)."""
+        return np.stack([v[g.groups == DRIVE] for g, v in zip(self.space.joints, own, strict=True)])
 
     def beside_instrument(self, without: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
         """Inertials and amplitudes, common nuisances, and each joint's own fixed ones: nothing of the discrepancy.

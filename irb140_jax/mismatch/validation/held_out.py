@@ -7,7 +7,7 @@ import numpy as np
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.gaussian import Posterior, grams, posterior
 from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals
-from irb140_jax.mismatch.regression.nuisances import Nuisances
+from irb140_jax.mismatch.regression.nuisances import DRIVE, Nuisances
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
@@ -195,11 +195,12 @@ def held_out(ex: Explanation, refit: Refit) -> HeldOut:
                 continue
             edges = np.linspace(0, len(s.t), len(mine) + 1).astype(int)
             rows, extra, rigid = np.repeat(mine, np.diff(edges)), ex.extra[r], bare[r]
-            named = s.y - s.torque(post.columns, corrected) - scale / settings.GAIN_COMMON * extra.common[..., 0]
+            laws = s.y - s.torque(post.columns, corrected) - scale / settings.GAIN_COMMON * extra.common[..., 0]
+            drives = [np.where(g == DRIVE, v, 0.0) for v, g in zip(own, extra.groups, strict=True)]
             unseen = {
                 "refit": rigid.y - rigid.torque(refit.columns, inertial),
-                "named": named,
-                "flexible": named - _of_own(extra, own),
+                "named": laws - _of_own(extra, drives),
+                "flexible": laws - _of_own(extra, own),
                 "left": s.y - s.torque(post.columns, erring) - extra.common @ common - _of_own(extra, errors),
             }
             for which, x in unseen.items():
@@ -266,9 +267,11 @@ def _unseen_errors(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.n
         mean = np.where(only, seen, ex.posterior(chosen, fold, instrument=False).mean)
         w = np.zeros(len(columns))
         w[: space.inertials], w[space.offset : -1], w[-1] = mean[: space.inertials], mean[space.inertials :], -1.0
+        seen_by = space.without(fold)
         for j, (g, place) in enumerate(zip(space.joints, space.places, strict=True)):
-            at = place[columns]
-            v, at = w[at >= 0], at[at >= 0] + len(g.groups)
+            at, drive = place[columns], np.flatnonzero(g.groups == DRIVE)
+            own = seen_by.own(j, ex.hyper[j], columns[:-1], w[:-1], instrument=False)[drive]
+            v, at = np.concatenate([own, w[at >= 0]]), np.concatenate([drive, at[at >= 0] + len(g.groups)])
             error[j] += float(v @ g.blocks[fold].sum(axis=0)[np.ix_(at, at)] @ v)
     return error
 

@@ -71,6 +71,10 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
     torque, amplitudes = np.sqrt(np.mean(along.nominal**2, axis=0)), np.zeros(lib.size)
     for effect, sites, shapes, first in lib.blocks:
         width = effect.law.width
+        if effect.place.of_servos:
+            # No servo drives the lively motion; what such a law takes off is what its shape says.
+            amplitudes[first : first + len(sites) * shapes.shape[1] * width] = 1.0
+            continue
         own = np.arange(width)[list(effect.law.own)]
         bounds = [effect.bounds(lib.robot, joints)[1] for joints in sites]
         together = [(own, effect.prior.proportion or [1.0] * len(own))]
