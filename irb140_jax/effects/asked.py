@@ -12,8 +12,8 @@ from irb140_jax.effects.records import At, Place, Prior
 from irb140_jax.types import Samples
 
 PLACE = Place(At.ASKED, of_servos=True)
-# Their torque is all of what their shape says; half or twice as much is another law.
-PRIOR = Prior(lowest=(0.5,), highest=(1.5,))
+# Their torque is all of what their shape says; a fifth more or less is another law.
+PRIOR = Prior(lowest=(0.8,), highest=(1.25,))
 
 
 def not_given(

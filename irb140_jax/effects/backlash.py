@@ -7,10 +7,10 @@ import numpy as np
 from jax import lax
 
 from irb140_jax.effects.base import ALIKE, Effect
+from irb140_jax.effects.grids import NOISES
 from irb140_jax.effects.records import At, Export, Law, Parameter, Place, Prior, Shapes
 
 CROSSINGS = (0.03, 0.3)  # s the link takes through the dead zone: less is not seen below 20 Hz, more is no gear
-NOISES = 10.0  # of the encoder in the least gap that is looked for: a few of them take its noise from the torque
 RATIO = 1.12  # of neighbouring gaps in the first scan: a tenth more and the link hits the flank too late
 POINTS = 4  # gaps in the search, each with two flanks
 FLANKS = (0.5, 2.0)  # in the first grid, over that of the scan

@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+NOISES = 10.0  # of the encoder in the least gap that is looked for: a few of them take its noise from the torque
+
 
 class Scales(NamedTuple):
     """Sizes of a set of recordings, for grids of shape parameters; each of shape (n,)."""

@@ -1,11 +1,13 @@
 """Servo dead band: position errors below some size are none to a servo, and larger ones that much smaller."""
 
+from functools import partial
+
 import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.effects.asked import PLACE, PRIOR, finer, not_given
+from irb140_jax.effects.asked import PLACE, PRIOR, not_given
 from irb140_jax.effects.base import Effect
-from irb140_jax.effects.grids import geometric_grid
+from irb140_jax.effects.grids import NOISES, between_neighbours, geometric_grid
 from irb140_jax.effects.records import Export, Law, Parameter, Shapes
 
 
@@ -16,9 +18,11 @@ def _columns(motion, joints, shape):
 
 
 def _grid(scales, joints):
-    # From a step of an encoder of 14 bits to where a servo is of little use, of the range that the joint was moved.
-    span = max(float(scales.high[joints[0]] - scales.low[joints[0]]), 1e-9)
-    return geometric_grid(3e-4 * span, 3e-2 * span, 12)
+    # From a step of an encoder of 14 bits to where a servo is of little use, of the range that the joint was moved; a
+    # band that is no wider than the encoder's noise would explain this noise.
+    j = joints[0]
+    span = max(float(scales.high[j] - scales.low[j]), 1e-9)
+    return geometric_grid(max(3e-4 * span, NOISES * float(scales.q_noise[j])), 3e-2 * span, 12)
 
 
 EFFECT = Effect(
@@ -41,6 +45,6 @@ EFFECT = Effect(
     ),
     place=PLACE,
     prior=PRIOR,
-    shapes=Shapes(grid=_grid, finer=finer),
+    shapes=Shapes(grid=_grid, finer=partial(between_neighbours, reach=2)),
     export=Export(not_in_mjcf="it is left out: MuJoCo's servos have no dead band"),
 )
