@@ -55,8 +55,8 @@ def planted(seed: int, amplitudes: dict[int, float]) -> tuple[Space, list[dict[s
     kinds = Kinds(np.full(len(candidates), -1), np.zeros(0), 0.05)
     space = Space(
         tuple(joints), tuple(candidates), INERTIALS, INERTIALS + COMMON, size, prior, kinds, -free, free, *nothing,
-        np.zeros(COMMON),
-    )
+        np.zeros((2, len(candidates))), np.zeros(COMMON),
+    )  # fmt: skip
     return space, data
 
 
@@ -107,6 +107,21 @@ def test_screening_says_what_the_evidence_says_at_the_width_of_the_inertials_of_
     before = density(space, data, (2,), hyper, width)
     expected = [density(space, data, (2, int(i)), hyper, width) - before + np.log(0.05) for i in which]
     np.testing.assert_allclose(gains(space, (2,), hyper, which), expected, atol=1e-8)
+
+
+def test_a_row_in_which_a_candidate_says_nothing_has_a_density_of_one_over_its_range():
+    bare, _ = planted(2, {2: 1.0})
+    silent, span = np.zeros((2, len(bare.candidates))), 5.0  # over the noise at level 1
+    silent[:, 0] = 7.0, np.log(span / np.sqrt(2.0 * np.pi))
+    space = dataclasses.replace(bare, silent=silent)
+    for level in (ONE - 3, ONE + 3):
+        hyper = ((*SETTING[:-1], level), SETTING)
+        noise = LEVELS[hyper[bare.candidates[0].joints[0]][-1]]
+        # Seven rows by the normal density of an error of zero, and by that of anything within the range.
+        lost = 7.0 * (np.log(1.0 / (np.sqrt(2.0 * np.pi) * noise)) - np.log(1.0 / span))
+        assert space.log_evidence((0, 2), hyper) == pytest.approx(bare.log_evidence((0, 2), hyper) - lost)
+        less = [gains(x, (2,), hyper, np.arange(2)) for x in (bare, space)]
+        np.testing.assert_allclose(less[0] - less[1], [lost, 0.0])
 
 
 def test_functions_of_shared_and_own_columns_have_the_moments_of_a_dense_regression():
@@ -186,8 +201,10 @@ def test_the_posterior_is_that_of_the_data():
     np.testing.assert_allclose(mean, np.linalg.solve(precision, moment), atol=1e-10)
 
 
-def test_settings_that_are_settled_have_no_better_neighbour_one_step_away():
+@pytest.mark.parametrize("silent", [0.0, 60.0])
+def test_settings_that_are_settled_have_no_better_neighbour_one_step_away(silent):
     space, _ = planted(4, {0: 2.0})
+    space = dataclasses.replace(space, silent=silent * np.eye(1, len(space.candidates)) * [[1.0], [0.1]])
     value, hyper = settled(space, (0,), (SETTING, SETTING))
     assert value == pytest.approx(space.log_evidence((0,), hyper))
     for j in range(2):

@@ -18,18 +18,21 @@ from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.recordings.condition import Conditioned
 
 
-def log_density_lost(
+def silent_rows(
     candidates: Sequence[Candidate], recordings: Sequence[Conditioned], joints: Sequence[JointGram], noise: Noise
 ) -> np.ndarray:
-    """What each candidate loses of the log density of what is logged, shape (candidates,); zero but for laws of servos.
+    """Independent rows in which each candidate is silent, and log(range / (sqrt(2 pi) noise)) of them at level 1.
 
     Args:
         candidates: All of a search.
         recordings: Conditioned.
         joints: Gram matrices of every joint, for their independent rows.
         noise: Of the rows.
+
+    Returns:
+        Shape (2, candidates); zero but for laws of servos.
     """
-    out, level = np.zeros(len(candidates)), np.sqrt(2.0 * np.pi * np.mean(noise.total**2, axis=0))
+    out, level = np.zeros((2, len(candidates))), np.sqrt(2.0 * np.pi * np.mean(noise.total**2, axis=0))
     for i, c in enumerate(candidates):
         if c.effect.law.silent is None:
             continue
@@ -42,5 +45,5 @@ def log_density_lost(
             rows.append(silent.ravel())
             span = max(span, torque)
         share = float(np.mean(np.concatenate(rows))) if any(map(len, rows)) else 0.0
-        out[i] = -share * float(joints[j].rows.sum()) * np.log(max(span / max(level[j], 1e-300), 1.0))
+        out[:, i] = share * joints[j].rows.sum(), np.log(max(span, 1e-300) / max(level[j], 1e-300))
     return out

@@ -12,7 +12,7 @@ from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.beside import Beside
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gaussian import cholesky_diagonals, posterior, root, with_prior
-from irb140_jax.mismatch.regression.gram import JointGram, JointHyper
+from irb140_jax.mismatch.regression.gram import LEVELS, JointGram, JointHyper
 from irb140_jax.mismatch.selection.kinds import Kinds
 
 Hyper = tuple[JointHyper, ...]  # hyperparameters, one a joint
@@ -36,6 +36,8 @@ class Space:
         kinds: What the prior says of kinds of effects.
         lowest, highest: Admissible amplitudes in prior units, padded with -inf and inf, shape (candidates, width).
         weights, least: Weights of the amplitudes in a sum that is bounded from below, and its bound, per candidate.
+        silent: Rows in which each candidate says nothing of what is logged, and log of the range over the noise, shape
+            (2, candidates): see `regression.silent`.
         centre: Prior means of the common nuisances in prior units, shape (offset - inertials,): not zero where rows
             were made with some of them.
     """
@@ -51,6 +53,7 @@ class Space:
     highest: np.ndarray
     weights: np.ndarray
     least: np.ndarray
+    silent: np.ndarray
     centre: np.ndarray
 
     @cached_property
@@ -157,7 +160,8 @@ class Space:
         H, by_width = self._by_width(chosen, hyper)
         if self._impossible(chosen, H, self.prior(chosen, hyper)):
             return -np.inf
-        return self.constant(hyper) + self._prior(chosen) + float(np.logaddexp.reduce(by_width))
+        known = self.constant(hyper) + self._prior(chosen) - float(self.lost(chosen, hyper).sum())
+        return known + float(np.logaddexp.reduce(by_width))
 
     def _by_width(self, chosen: Sequence[int], hyper: Hyper) -> tuple[np.ndarray, np.ndarray]:
         """Gram matrix of a set's columns and y, and log evidence and prior at each width of the inertials' prior."""
@@ -191,6 +195,14 @@ class Space:
         without = np.delete(np.delete(H, self.inertials, axis=0), self.inertials, axis=1)
         free, none = (float(np.logaddexp.reduce(_width_evidences(x, self.inertials))) for x in (H, without))
         return free - none
+
+    def lost(self, which: Sequence[int] | np.ndarray, hyper: Hyper) -> np.ndarray:
+        """Log density of what is logged that candidates lose where they say nothing of it, shape (len(which),)."""
+        rows, ranges = self.silent[:, np.asarray(which, dtype=int)]
+        if not rows.any():
+            return np.zeros(len(rows))
+        levels = np.log([LEVELS[hyper[self.candidates[i].joints[0]][-1]] for i in which])
+        return rows * np.maximum(ranges - levels, 0.0)
 
     def _prior(self, chosen: Sequence[int]) -> float:
         return float(sum(self.log_prior[c] for c in chosen)) + self.kinds.log_prior(chosen)

@@ -24,7 +24,7 @@ from irb140_jax.mismatch.regression.rows import (
     with_candidates,
     with_library,
 )
-from irb140_jax.mismatch.regression.silent import log_density_lost
+from irb140_jax.mismatch.regression.silent import silent_rows
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
 from irb140_jax.mismatch.selection.averages import Site, site_of
@@ -179,9 +179,8 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     del sums  # hundreds of megabytes, before the search
     first = of_kinds(given.first, lib.effects)
     space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
-    silent = log_density_lost(data.candidates, [r.recording for r in start.along], joints, noise)
-    centre = _centre(space, given.drive, start.delay)
-    space = dataclasses.replace(space, centre=centre, log_prior=space.log_prior + silent)
+    silent = silent_rows(data.candidates, [r.recording for r in start.along], joints, noise)
+    space = dataclasses.replace(space, centre=_centre(space, given.drive, start.delay), silent=silent)
     sites = [site_of(c) for c in data.candidates]
     barred = [start.dropped.count(site) >= OFTEN or site in start.unproved for site in sites]
     without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))

@@ -24,10 +24,9 @@ def settled(
         Log posterior of the set, summed over shapes, -inf where it is inadmissible; and the hyperparameters.
     """
     joints = list(range(len(space.joints)) if joints is None else joints)
-    index = space.with_y(space.set_columns(chosen))
     prior, at_best = space.prior(chosen, hyper), 0
     for j in itertools.cycle(joints):
-        better = _climbed(space, index, hyper, j, prior)
+        better = _climbed(space, chosen, hyper, j, prior)
         at_best += 1
         if better != hyper:
             hyper, prior, at_best = better, space.prior(chosen, better), 1
@@ -55,8 +54,9 @@ def over_shapes(space: Space, chosen: Sequence[int], hyper: Hyper) -> float:
     return out
 
 
-def _climbed(space: Space, index: np.ndarray, hyper: Hyper, j: int, prior: np.ndarray) -> Hyper:
+def _climbed(space: Space, chosen: Sequence[int], hyper: Hyper, j: int, prior: np.ndarray) -> Hyper:
     """Hyperparameters, those of one joint at their best beside a set whose columns have these prior widths."""
+    index, here = space.with_y(space.set_columns(chosen)), [i for i in chosen if space.at_joint[j, i]]
     gram, at = space.joints[j], space.places[j][index]
     mine, others = np.flatnonzero(at >= 0), np.flatnonzero(at < 0)
     scale, elsewhere = np.append(prior, 1.0), [i for i in range(len(space.joints)) if i != j]
@@ -71,7 +71,8 @@ def _climbed(space: Space, index: np.ndarray, hyper: Hyper, j: int, prior: np.nd
             own = gram.left(new, take, scale)
             diagonal = cholesky_diagonals(rest + own)
             value = 0.5 * (own[:, -1, -1] - diagonal[:, -1] ** 2) - np.log(diagonal[:, :-1]).sum(axis=1)
-            known.update(zip(new, value + [gram.at(s).constant for s in new], strict=True))
+            lost = [space.lost(here, (*hyper[:j], s, *hyper[j + 1 :])).sum() for s in new]
+            known.update(zip(new, value + [gram.at(s).constant for s in new] - lost, strict=True))
 
     now = hyper[j]
     while True:

@@ -50,7 +50,8 @@ def gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) 
         mean = np.linalg.solve(M, rhs[..., None])[..., 0]
         gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
         ids = which[members]
-        out[members] = np.where(space.outside(ids, mean), -np.inf, gain + space.log_prior[ids] + more[ids])
+        known = space.log_prior[ids] + more[ids] - space.lost(ids, hyper)
+        out[members] = np.where(space.outside(ids, mean), -np.inf, gain + known)
     return out
 
 

@@ -51,7 +51,7 @@ def space_of(
     return Space(
         joints, candidates, data.nuisances, data.nuisances + common, len(data.scale) + common,
         log_prior(data, lib, first), kinds_of(candidates, settings.RARE), lowest, highest, weights, least,
-        np.zeros(common),
+        np.zeros((2, len(candidates))), np.zeros(common),
     )  # fmt: skip
 
 
