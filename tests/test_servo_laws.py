@@ -102,6 +102,15 @@ def test_logs_of_torque_are_not_searched_for_laws_of_servos(robot):
     assert not set(LAWS) & said
 
 
+@pytest.mark.parametrize("unknown", ["kp", "kd"])
+def test_what_a_servo_lacks_of_a_law_that_is_not_known_is_not_looked_for(robot, unknown):
+    gains = {"kp": np.array(KP), "kd": np.array(KD)} | {unknown: np.array([np.nan, 0.8 if unknown == "kd" else KP[1]])}
+    config = DiagnoseConfig(effects=tuple(CATALOGUE[slug] for slug in ("coulomb_friction", *LAWS)))
+    recordings = [dataclasses.replace(r, drive=stated_drive(**gains)) for r in loops("")]
+    diagnosis = diagnose(robot, recordings, config).diagnosis
+    assert not set(LAWS) & ({f.effect for f in diagnosis.findings} | {entry.effect for entry in diagnosis.not_testable})
+
+
 def test_the_limit_found_is_the_force_range_of_the_servo_in_the_file(diagnosed, tmp_path):
     result = diagnosed("torque_saturation")
     save(result, tmp_path)

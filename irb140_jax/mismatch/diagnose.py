@@ -135,8 +135,10 @@ def _nothing_compared(data: Comparison, config: DiagnoseConfig, reason: str) -> 
 
 
 def _searched(config: DiagnoseConfig, data: Comparison) -> tuple[Effect, ...]:
-    """The effects that there can be in logs of this kind."""
-    return tuple(e for e in config.effects if e.place.is_in(servo=data.servo is not None))
+    """The effects that there can be in logs of this kind; what a servo lacks of its law shows where that is known."""
+    known = data.servo is None or data.servo.drive.is_known
+    there = (e for e in config.effects if e.place.is_in(servo=data.servo is not None))
+    return tuple(e for e in there if known or not e.place.of_servos)
 
 
 def _explained(

@@ -56,6 +56,12 @@ class Drive:
         lists = {name: [word(x) for x in getattr(self, name).tolist()] for name in ARRAYS}
         return {**lists, "said": list(self.said), "lag": self.lag}
 
+    @property
+    def is_known(self) -> bool:
+        """Whether the law of every servo is: gains that are stated, and no worse than stated gains are."""
+        kp, kd = self.kp_width <= GAIN_WIDTH, self.kd_width <= GAIN_WIDTH * np.abs(self.kd)
+        return all(word in ("model", "map") for word in self.said) and bool(np.all(kp & kd))
+
     def found(self, delay: float | np.ndarray, lag: float, kd: float | np.ndarray = 0.0) -> "Drive":
         """The drive as a fit found it.
 
