@@ -6,7 +6,7 @@ from functools import cache
 import mujoco
 import numpy as np
 import pytest
-from helpers_servo import KD, KP, closed_loop, given, two_links
+from helpers_servo import JOINTS, KD, KP, closed_loop, given, two_links
 
 import irb140_jax as irb
 from irb140_jax.effects.catalogue import CATALOGUE
@@ -14,8 +14,8 @@ from irb140_jax.mismatch import DiagnoseConfig, diagnose, predict, save
 from irb140_jax.recordings import stated_drive
 
 STATED = stated_drive(np.array(KP), np.array(KD))
-FRICTION = {"shoulder": 'frictionloss=".4" damping=".13"', "elbow": 'frictionloss=".2" damping=".02"'}
-ORDINARY = {("coulomb_friction", joint) for joint in FRICTION} | {("viscous_friction", joint) for joint in FRICTION}
+SHOULDER, ELBOW = 'frictionloss=".4" damping=".13"', 'frictionloss=".2" damping=".02"'
+ORDINARY = {(f"{kind}_friction", joint) for kind in ("coulomb", "viscous") for joint in JOINTS}
 LAWS = tuple(slug for slug, effect in CATALOGUE.items() if effect.place.of_servos)
 # Compiling the whole library takes most of a minute; these are what such a law might be taken for.
 LIBRARY = ("coulomb_friction", "viscous_friction", "asymmetric_friction", "rotor_inertia", "torque_gain",
@@ -54,7 +54,8 @@ def robot(tmp_path_factory):
 @cache
 def loops(slug, seed=1):
     law = HIDDEN[slug][0] if slug else given
-    both = (closed_loop(two_links(actuators="", **FRICTION), s, law=law)[0] for s in (seed, seed + 1))
+    plant = two_links(actuators="", shoulder=SHOULDER, elbow=ELBOW)
+    both = (closed_loop(plant, s, law=law)[0] for s in (seed, seed + 1))
     return tuple(dataclasses.replace(r, drive=STATED) for r in both)
 
 
@@ -94,7 +95,7 @@ def test_a_servo_that_gives_what_it_is_asked_for_has_no_such_law(diagnosed):
 
 
 def test_logs_of_torque_are_not_searched_for_laws_of_servos(robot):
-    _, torque = closed_loop(two_links(**FRICTION))
+    _, torque = closed_loop(two_links(shoulder=SHOULDER, elbow=ELBOW))
     recording = dataclasses.replace(loops("")[0], tau=torque, qdes=None, drive=None)
     config = DiagnoseConfig(effects=tuple(CATALOGUE[slug] for slug in ("coulomb_friction", *LAWS)))
     diagnosis = diagnose(robot, [recording], config).diagnosis
@@ -104,9 +105,9 @@ def test_logs_of_torque_are_not_searched_for_laws_of_servos(robot):
 
 @pytest.mark.parametrize("unknown", ["kp", "kd"])
 def test_what_a_servo_lacks_of_a_law_that_is_not_known_is_not_looked_for(robot, unknown):
-    gains = {"kp": np.array(KP), "kd": np.array(KD)} | {unknown: np.array([np.nan, 0.8 if unknown == "kd" else KP[1]])}
+    kp, kd = (np.where([name == unknown, False], np.nan, x) for name, x in (("kp", KP), ("kd", KD)))
     config = DiagnoseConfig(effects=tuple(CATALOGUE[slug] for slug in ("coulomb_friction", *LAWS)))
-    recordings = [dataclasses.replace(r, drive=stated_drive(**gains)) for r in loops("")]
+    recordings = [dataclasses.replace(r, drive=stated_drive(kp, kd)) for r in loops("")]
     diagnosis = diagnose(robot, recordings, config).diagnosis
     assert not set(LAWS) & ({f.effect for f in diagnosis.findings} | {entry.effect for entry in diagnosis.not_testable})
 
