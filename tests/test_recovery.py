@@ -177,7 +177,7 @@ def test_a_diagnosis_is_the_same_whenever_it_is_made():
     assert diagnose(robot, case.recordings).diagnosis == diagnosed("torque_offset")[1].diagnosis
 
 
-@pytest.mark.parametrize(("seed", "joints", "slides"), [(11, 1, 0.0), (12, 1, 1.0), (6, 3, 0.3), (4, 5, 0.4)])
+@pytest.mark.parametrize(("seed", "joints", "slides"), [(11, 1, 0.0), (12, 1, 1.0), (6, 3, 0.3)])
 def test_nothing_is_named_where_nothing_is_hidden(seed, joints, slides):
     robot, case = machine(seed, joints, slides)
     diagnosis = diagnose(robot, case.recordings).diagnosis.to_json()
