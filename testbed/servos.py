@@ -26,7 +26,6 @@ from testbed.plants import Hidden, Plant, Sizes, sizes_of
 from testbed.seeds import generator
 
 Form = Literal["torque", "known", "wrong", "unknown", "laws"]
-FORMS: tuple[Form, ...] = ("torque", "known", "wrong", "unknown")
 PARTS = 2  # steps of the simulation in one of the log's fine ones
 SETTLE = 1.5  # s before a recording begins, in which the arm sags into its first posture
 BETWEEN = "between"  # name of the joint between motor and link
