@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-NOISES = 10.0  # of the encoder in the least gap that is looked for: a few of them take its noise from the torque
+NOISES = 10.0  # of the encoder in the least gap or dead band that is looked for: a few explain its noise in the torque
 
 
 class Scales(NamedTuple):

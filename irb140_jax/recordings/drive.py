@@ -14,8 +14,7 @@ GAIN_WIDTH = 0.10  # relative standard deviation of a stated Kp or Kd: of a torq
 # s by which all commands may act at another time than the first estimate says, and by which the torque of all servos
 # may come late: a sample of a controller at 1 kHz, and a few of a slow bus.  Judgements.
 COMMON_DELAY_WIDTH, LAG_WIDTH = 1e-3, 5e-3
-# s and rows by which commands of one joint may act at another time than those of all joints are found to.  Not more:
-# what is explained by a delay that no model holds is missing when the model predicts.
+# s and rows by which commands of one joint may act at another time than those of all joints are found to.
 OWN_DELAY_WIDTH, ROWS_WIDTH = 1e-3, 0.1
 ARRAYS = ("kp", "kd", "limit", "low", "high", "delay", "kp_width", "kd_width")  # of a drive, one number a joint each
 SECTIONS = ("kp", "kd", "torque_limit", "command_delay")  # of the column map
