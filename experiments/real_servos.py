@@ -83,8 +83,10 @@ def off(result: Result, runs: Sequence[Recording]) -> dict[str, list[np.ndarray]
 
 
 def completed(stated: Drive | None, found: Drive | None) -> Drive:
-    """A run's drive, with the gains that are not stated and all times as they were found for others."""
+    """A run's drive as it was found; of runs with another Kp, what is not stated of it and all times."""
     assert stated is not None and found is not None
+    if np.array_equal(stated.kp, found.kp):
+        return found
     gains = {k: np.where(np.isnan(getattr(stated, k)), getattr(found, k), getattr(stated, k)) for k in ("kp", "kd")}
     return dataclasses.replace(stated, **gains, delay=found.delay, lag=found.lag)
 

@@ -124,4 +124,6 @@ def test_without_commands_a_prediction_is_the_torque_that_is_given(diagnosed):
     model, recording = diagnosed("torque_saturation").model, loops("torque_saturation")[0]
     planned = dataclasses.replace(recording, qdes=None, drive=None)
     # The real torque is at its limit, but for what a low-pass makes of that; the command asked for seven times as much.
-    assert np.abs(predict(model, planned)["corrected"][:, 0]).max() < 1.2 * 4.5
+    # What damps within the doubt of Kd is left to the drive.
+    damped = 0.13 * np.abs(np.gradient(recording.q[:, 0], recording.t)).max()
+    assert np.abs(predict(model, planned)["corrected"][:, 0]).max() < 1.2 * 4.5 + damped

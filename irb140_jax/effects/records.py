@@ -125,19 +125,19 @@ class Place:
         at: Where on the way from the motor to the log.
         sites: Groups of joints at which it can act, (sites, m).
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
-        of_clocks: It is an error of the torque channel's clock: torque made of commands and positions has none.
+        of_channel: It is an error of the torque channel, of its scale or clock; torque made of commands has none.
         of_servos: It is a law of position servos: of logs of commands alone.
     """
 
     at: At = At.LINKS
     sites: Callable[[Robot], np.ndarray] = each_joint
     everywhere: bool = False
-    of_clocks: bool = False
+    of_channel: bool = False
     of_servos: bool = False
 
     def is_in(self, *, servo: bool) -> bool:
         """Whether there can be such an effect in logs of commands, or in logs of torque."""
-        return not (self.of_clocks if servo else self.of_servos)
+        return not (self.of_channel if servo else self.of_servos)
 
     @property
     def is_friction(self) -> bool:

@@ -12,7 +12,6 @@ from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
 from irb140_jax.mismatch import settings
-from irb140_jax.mismatch.corrected.drives import with_drives
 from irb140_jax.mismatch.corrected.fitted import discrepancy_carried, fitted_model
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file
@@ -150,7 +149,8 @@ def _explained(
     effects = _searched(config, data)
     ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved, later)
     ex = without_negligible(ex, data.servo)
-    return dataclasses.replace(ex, scaled=torque_scale_odds(ex)[1] >= settings.NAMED)
+    scaled = data.servo is None and torque_scale_odds(ex)[1] >= settings.NAMED
+    return dataclasses.replace(ex, scaled=scaled)
 
 
 def _corrected(
@@ -173,8 +173,8 @@ def _corrected(
     proof = proof.as_predicted(ex.beyond_columns(post, scale, by_laws, data.band))
     discrepancy, harmful = discrepancy_carried(ex, own, proof.carried), np.zeros(data.robot.n, dtype=bool)
     if data.servo is not None:
-        model, off = with_drives(model, data.servo, ex.of_drives(own))
-        data = data.later(ex.delay[0] + off.delay, ex.delay[1], off.kd)
+        kd, late = ex.of_drives(own).T
+        data = data.later(ex.delay[0] + data.servo.own_delay_width * late, ex.delay[1], kd)
         model = dataclasses.replace(model, drive=data.recordings[0].drive)
         by_laws = [torques_along(model, r).corrected for r in data.smooth]
     if data.servo is not None and discrepancy is not None:

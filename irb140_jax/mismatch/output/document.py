@@ -79,7 +79,7 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     missing = undecidable(robot, of.proof, logged, scatter, of.data.band)
     found = of_servos(of.ex, of.servo, [*of.findings, *torque_scale_finding(robot, of.ex)])
     fit, shifts = fit_by_joint(robot, of.proof, scatter), link_shifts(robot, of.ex)
-    effects = {TORQUE_GAIN.slug: TORQUE_GAIN} | of.ex.lib.effects
+    effects = of.ex.lib.effects | ({TORQUE_GAIN.slug: TORQUE_GAIN} if of.ex.scaled else {})
     kind = verdict(of.ex, of.proof, found, of.rest, missing)
     moving = fit_by_joint(robot, of.proof, scatter, at_rest=False)
     said = summary(kind, found, of.rest, moving, shifts, robot, len(of.data.recordings), missing.values(), effects)

@@ -93,8 +93,6 @@ def of_servos(ex: Explanation, servo: Commanded | None, found: list[Finding]) ->
                 f"both, {both:.3g}, is known; recordings with two different Kd, or of unpowered motion, would tell "
                 "them apart."
             )
-        elif f.effect == "torque_gain":
-            said = " On a servo this means that the stated Kp is wrong, or that the masses of the model are."
         elif f.effect == "actuator_lag":
             said = (
                 " The fit can't tell its cause: the drive may apply commands late, its torque may lag, or the clocks "
