@@ -30,6 +30,7 @@ from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted, unproved
 from irb140_jax.mismatch.validation.testable import reference, visibility
+from irb140_jax.mismatch.validation.undecided_joints import mostly_unexplained
 from irb140_jax.mismatch.validation.unexplained import unexplained
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
@@ -104,11 +105,16 @@ def _diagnosed(
     ex = _explained(data, sensors, config, progress)
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
-    proof = held_out(ex, refit)
+    logged, left = [s.tau for s in ex.data.stretches], held_out(ex, refit)
+    corrected = _corrected(data, ex, refit, left, config)
+    # Without them others may be found to explain nothing, too.
+    while (fewer := ex.not_only_on(mostly_unexplained(corrected[2], logged, np.hypot(*sensors)))).chosen != ex.chosen:
+        ex, left = fewer, held_out(fewer, refit)
+        corrected = _corrected(data, ex, refit, left, config)
     progress("looking for structure that no effect explains")
-    rest, found = unexplained(ex, proof), findings(robot, ex)
+    rest, found = unexplained(ex, left), findings(robot, ex)
     stated = data.servo
-    data, model, proof, harmful, by_laws = _corrected(data, ex, refit, proof, config)
+    data, model, proof, harmful, by_laws = corrected
     beyond = beyond_file(model, data.smooth, by_laws)
     matters = reference(ex.lib, ex.scales, data.band.rate)
     seen = visibility(ex, matters)

@@ -31,11 +31,16 @@ from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.result import Diagnosis, Finding, Fit, Provenance, Unexplained
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
-from irb140_jax.mismatch.validation.testable import Seen, not_testable
+from irb140_jax.mismatch.validation.testable import Seen, not_testable, shows_no_friction
 from irb140_jax.mismatch.validation.undecided_joints import torque_size, undecidable
 from irb140_jax.mismatch.validation.unexplained import Structure
 from irb140_jax.recordings.condition import Commanded
 from irb140_jax.robot import Robot
+
+NO_FRICTION_SHOWS = (
+    "friction of a usual size would show on no joint above what the sensors leave: record with finer positions or less "
+    "noise, or longer"
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,9 +85,11 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     found = of_servos(of.ex, of.servo, [*of.findings, *torque_scale_finding(robot, of.ex)])
     fit, shifts = fit_by_joint(robot, of.proof, scatter), link_shifts(robot, of.ex)
     effects = of.ex.lib.effects | ({TORQUE_GAIN.slug: TORQUE_GAIN} if of.ex.scaled else {})
-    kind = verdict(of.ex, of.proof, found, of.rest, missing)
+    blind = shows_no_friction(of.seen, effects)
+    kind = verdict(of.ex, of.proof, found, of.rest, missing, blind)
     moving = fit_by_joint(robot, of.proof, scatter, at_rest=False)
-    said = summary(kind, found, of.rest, moving, shifts, robot, len(of.data.recordings), missing.values(), effects)
+    lacks = [*missing.values(), *([NO_FRICTION_SHOWS] if blind else [])]
+    said = summary(kind, found, of.rest, moving, shifts, robot, len(of.data.recordings), lacks, effects)
     return rounded(Diagnosis(
         verdict=kind,
         findings=tuple(found),

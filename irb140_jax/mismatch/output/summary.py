@@ -16,26 +16,31 @@ from irb140_jax.robot import Robot
 
 
 def verdict(
-    ex: Explanation, proof: HeldOut, found: Sequence[Finding], rest: Sequence[Structure], open_: dict[int, str]
-) -> Verdict:
+    ex: Explanation, proof: HeldOut, found: Sequence[Finding], rest: Sequence[Structure], open_: dict[int, str],
+    blind: bool,
+) -> Verdict:  # fmt: skip
     """The verdict.
 
     `unexplained` where structure is left and nothing is named, or where the structure left on a joint is larger than
     what was named there.  `undecided` where a joint is open, unless a finding is on a joint that is not open, or
-    removes more of an open joint's error than is left there: then the open joints are a note.
+    removes more of an open joint's error than is left there: then the open joints are a note.  Also where nothing is
+    found and ordinary friction would not show on any joint (`blind`).
     """
     nominal, refit, corrected = (proof.rmse(x) for x in (proof.nominal, proof.refit, proof.corrected))
     named = np.sqrt(np.clip(nominal**2 - corrected**2, 0.0, None))
     names = ex.lib.robot.joint_names
     at = {names.index(joint) for finding in found for joint in finding.joints}
-    decided = any(j not in open_ or refit[j] ** 2 > 2.0 * corrected[j] ** 2 for j in at)
+    without = np.minimum(nominal, refit)  # of joints that mean something else, a refit may err more than the model
+    decided = any(j not in open_ or without[j] ** 2 > 2.0 * corrected[j] ** 2 for j in at)
     if any(not found or u.rms > named[u.joint] for u in rest):
         return "unexplained"
     if open_ and not decided:
         return "undecided"
     if found:
         return "physics_left_out"
-    return "parameters_only" if _inertials_matter(ex) else "no_mismatch"
+    if _inertials_matter(ex):
+        return "parameters_only"
+    return "undecided" if blind else "no_mismatch"
 
 
 def _inertials_matter(ex: Explanation) -> bool:

@@ -4,7 +4,7 @@ Along a slow motion hardly anything is large, so a share of the torque there say
 heavy as the arm.  Strengths are therefore those of a lively motion of the same robot within its limits.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -160,6 +160,12 @@ def _related(one: AtSite, member: AtSite) -> bool:
     """Whether an effect is a named one or a part of it."""
     a, b = one.effect, member.effect
     return one.joints == member.joints and (a.slug == b.slug or a.slug in b.law.contains)
+
+
+def shows_no_friction(seen: Seen, effects: Mapping[str, Effect]) -> bool:
+    """Whether ordinary friction was searched for and would show on no joint: then nothing found says nothing."""
+    ordinary = [z for (slug, _), (z, _) in seen.items() if effects[slug].prior.ordinary]
+    return bool(ordinary) and max(ordinary) < settings.VISIBLE
 
 
 def not_testable(
