@@ -396,6 +396,21 @@ def test_noise_of_many_joints_is_no_motion_of_a_combination_of_them():
     assert np.max(shares) < 1e-4
 
 
+@pytest.mark.parametrize("value", [0.0, 0.5, 1.0 / 3.0])
+@pytest.mark.parametrize("still", [[5], [0], [3, 4, 5], [0, 1, 2, 3, 4]])
+@pytest.mark.parametrize("rate", [100.0, 250.0, 500.0])
+def test_joints_that_stand_exactly_still_have_no_weight(value, still, rate):
+    t = times(12.0, rate)
+    q = np.sin(2.0 * np.pi * np.linspace(0.3, 0.8, 6) * t[:, None])
+    q = q + 2e-5 * np.random.default_rng(0).normal(size=q.shape)
+    q[:, still] = value
+    moving, few = np.setdiff1d(np.arange(6), still), 10  # the lowest lines are kept of every joint
+    weights, floor, _ = signal_weights(q, np.zeros(6), rate)
+    assert np.isfinite(weights).all() and not floor[still].any() and floor[moving].all()
+    assert not weights[few:, still].any() and not weights[few:, :, still].any()
+    assert weights[few:, moving, moving].any()
+
+
 def test_a_joint_that_is_shaken_by_another_one_keeps_a_motion_that_its_own_encoder_can_not_tell():
     t, rng = times(15.0), np.random.default_rng(0)
     shaking = np.asarray(signal.lfilter([1.0], [1.0, -1.6, 0.8], rng.normal(size=len(t))))  # strongest at 37 Hz

@@ -129,21 +129,23 @@ def signal_weights(
     """
     n, length, window = q.shape[1], _window(q, rate), _taper(q, rate)
     starts = range(0, len(q) - length + 1, max(length - length // 2, 1))
-    spectra = np.stack([np.fft.rfft(signal.detrend(q[s : s + length], axis=0) * window[:, None], axis=0)
+    # From the first sample: rounding of a constant would pass for motion.
+    spectra = np.stack([np.fft.rfft(signal.detrend(q[s : s + length] - q[0], axis=0) * window[:, None], axis=0)
                         for s in starts])  # fmt: skip
     P = 2.0 * np.einsum("kfi,kfj->fij", spectra, spectra.conj()) / (len(spectra) * rate * np.sum(window**2))
     f = np.fft.rfftfreq(length, 1.0 / rate)
     own = np.einsum("fii->fi", P).real
     # An average of so many periodograms has a median below its mean.
     middle = special.chdtri(2 * len(spectra), 0.5) / (2 * len(spectra))
-    floor = np.maximum(np.maximum(np.median(own[f > 0.6 * f[-1]], axis=0) / middle, density), 1e-300)
-    whitened = P / np.sqrt(floor[:, None] * floor)
+    floor = np.maximum(np.median(own[f > 0.6 * f[-1]], axis=0) / middle, density)
+    size = np.where(floor > 0.0, np.sqrt(floor), np.inf)  # no noise: the joint stands exactly still
+    whitened = P / size[:, None] / size
     # How many periodograms' worth a line is: the window's taper widens it to several bins.
     count = len(spectra) * np.sum(window) ** 2 / (length * np.sum(window**2))
     alone = np.zeros_like(P)
     for j in range(n):
         alone[:, j, j] = _kept(whitened[:, j, j][:, None, None], count, 0.0)[:, 0, 0]
-    together = np.sqrt(floor)[:, None] * _kept(whitened, count, BREADTH) / np.sqrt(floor)
+    together = np.sqrt(floor)[:, None] * _kept(whitened, count, BREADTH) / size
     weights = alone + (np.eye(n) - alone) @ together
     weights[:FEW] = np.eye(n)
     return weights, floor, f
