@@ -95,6 +95,87 @@ def test_a_channel_that_freezes_far_from_what_the_motion_needs_is_left_out(tmp_p
     assert lost is not None and lost[1100:, 0].all() and not lost[:900].any()
 
 
+def positions(change, held=None) -> list[Recording]:
+    """The three motions with their positions spoiled, or with a joint truly held and the torque that this needs."""
+    out = []
+    for seed, r in enumerate(recordings()):
+        q, tau = r.q.copy(), r.tau
+        if held is not None:
+            t, q, qd, qdd = made.motion(3, seed=seed, duration=10.0, rate=200.0)
+            q[:, held], qd[:, held], qdd[:, held] = 0.5, 0.0, 0.0
+            tau = made.rigid_torque(made.model(), q, qd, qdd) + FRICTION * np.sign(qd)
+            tau += 0.02 * np.random.default_rng(seed).normal(size=q.shape)
+        change(q)
+        out.append(dataclasses.replace(r, q=q, tau=tau))
+    return out
+
+
+def marked(r: Recording) -> tuple[np.ndarray, str]:
+    found = with_lost_torque_marked(r, np.full(3, 0.02), made.robot())
+    return np.zeros(r.q.shape, bool) if found.torque_lost is None else found.torque_lost, " ".join(found.notes)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5])
+def test_a_dead_position_is_said_and_joints_that_depend_on_it_are_not_judged(noise):
+    def dead(q):
+        q[:, 0] = 0.5 + noise * np.random.default_rng(0).normal(size=len(q))
+
+    # In the other motion gravity on the elbow happens to explain too much of the shoulder's torque to be sure.
+    spoiled = positions(dead)[::2]
+    lost, said = marked(spoiled[0])
+    assert lost.all() and "q.shoulder stays at 0.5 in every row while tau.shoulder changes by" in said
+    diagnosis = diagnose(made.robot(), spoiled).diagnosis.to_json()
+    assert diagnosis["verdict"] == "undecided" and diagnosis["findings"] == []
+    assert "Dead or frozen channels" in diagnosis["summary"]
+    assert "shoulder is not judged: dead or frozen channels" in " ".join(diagnosis["notes"])
+    assert "moves in only" not in " ".join(diagnosis["notes"])
+
+
+def test_a_position_that_freezes_halfway_takes_its_rows_from_all_joints_that_depend_on_it(sound):
+    def frozen(q):
+        q[len(q) // 2 :, 0] = q[len(q) // 2, 0]
+
+    spoiled = positions(frozen)
+    lost, said = marked(spoiled[0])
+    assert lost[1000:].all() and not lost[:900].any() and "q.shoulder is frozen at" in said and "from 5 s" in said
+    diagnosis = named(diagnose(made.robot(), spoiled).diagnosis.to_json())
+    assert diagnosis and diagnosis.keys() <= sound.keys()
+
+
+@pytest.mark.parametrize("held", [0, 1, 2])
+@pytest.mark.parametrize("noise", [0.0, 1e-5])
+def test_a_joint_that_is_held_by_its_drive_or_its_brake_is_no_dead_position(held, noise):
+    def encoder(q):
+        q += noise * np.random.default_rng(0).normal(size=q.shape)
+
+    (r, *_) = positions(encoder, held)
+    braked = r.tau.copy()
+    braked[:, held] = 1.5 + 0.02 * np.random.default_rng(1).normal(size=len(braked))
+    for tau in (r.tau, braked):
+        lost, said = marked(dataclasses.replace(r, tau=tau))
+        assert not lost.any() and "may be dead" not in said
+
+
+def test_a_joint_that_is_braked_halfway_is_no_frozen_position():
+    t, q, qd, qdd = made.motion(3, duration=10.0, rate=200.0)
+    slowed = np.clip((6.0 - t) / 2.0, 0.0, 1.0)  # from 4 s to 6 s the shoulder's motion fades out
+    q[:, 0] *= slowed**3
+    step = t[1] - t[0]
+    qd[:, 0] = np.gradient(q[:, 0], step)
+    qdd[:, 0] = np.gradient(qd[:, 0], step)
+    tau = made.rigid_torque(made.model(), q, qd, qdd) + FRICTION * np.sign(qd)
+    r = Recording(t=t, q=q, tau=tau, joint_names=("shoulder", "elbow", "wrist"))
+    assert not np.ptp(q[1200:, 0]) and not marked(r)[0].any()
+
+
+def test_friction_differs_between_recordings_of_no_joint_that_is_not_judged():
+    def dead(tau):
+        tau[:, 1] = 0.0
+
+    notes = " ".join(diagnose(made.robot(), recordings(dead)).diagnosis.to_json()["notes"])
+    assert "friction of elbow differs" not in notes and "elbow is not judged: it moves in only" not in notes
+
+
 def test_a_log_that_is_not_made_of_numbers_is_refused():
     (one, *others) = recordings()
     q = one.q.copy()

@@ -97,8 +97,7 @@ def check_motion(recording: Recording, seen: Glance, robot: Robot) -> Recording:
     moving = seen.travel > least(MOVING)
     if recording.has_torque:
         recording = with_lost_torque_marked(recording, least(MOVING), robot)
-        lost = recording.torque_lost
-        if lost is not None and np.all(lost.all(axis=0) | ~moving):
+        if np.all((np.ptp(recording.tau, axis=0) == 0.0) | ~moving):
             raise RecordingError(f"{source}: no moving joint has a torque that changes: columns "
                                  f"{', '.join('tau.' + names[j] for j in np.flatnonzero(moving))} are dead channels; "
                                  "log motor torques or currents, or map the columns that hold them with --columns "
@@ -107,8 +106,9 @@ def check_motion(recording: Recording, seen: Glance, robot: Robot) -> Recording:
         _check_derivative(recording, seen.qd, seen.logged_qd, moving, ("qd", "q"))
     if seen.logged_qdd is not None:
         _check_derivative(recording, seen.qdd, seen.logged_qdd, moving, ("qdd", "q twice"))
+    dead = False if recording.torque_lost is None else recording.torque_lost.all(axis=0)
     notes = [*recording.notes, *(f"Joint {names[j]} stands still: what depends on its motion can't be seen"
-                                 for j in np.flatnonzero(~moving))]
+                                 for j in np.flatnonzero(~moving & ~dead))]
     for j, name in enumerate(names):
         if recording.has_torque:
             notes += _clipping_note(recording.tau[:, j], name)

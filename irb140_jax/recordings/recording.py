@@ -32,7 +32,8 @@ class Recording:
         notes: Repairs made and oddities seen, one plain sentence each.
         file_t: Time of every row of the file, those that reading left out included [s]; None where it left out none.
         sha256: Of the file it was read from; empty where it comes from none.
-        torque_lost: Rows in which a torque channel is dead or frozen, shape (T, n); None where none is.
+        torque_lost: Rows in which a channel that a joint's torque depends on is dead or frozen, shape (T, n); None
+            where none is.
         qdes: Commanded positions of a log that has them in place of torque [rad or m], shape (T, n), else None; `tau`
             is then NaN until `recordings.servo` makes it.
         qddes: Commanded velocities of such a log [rad/s or m/s], shape (T, n), or None.

@@ -171,7 +171,7 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     return [
         *of.data.servo_notes, *harmful_notes(robot, of.harmful), *open_joints,
         *rest_notes(robot, of.proof, np.hypot(*of.sensors)),
-        *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names),
+        *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names, judged),
         *channels, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
         *notes(of.data, of.uncertainty, judged), *gap_notes(robot, gap, torque, lacking),
     ]  # fmt: skip

@@ -9,7 +9,7 @@ from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.records import digits
 from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
 from irb140_jax.mismatch.regression.nuisances import FIXED, SCALED
-from irb140_jax.mismatch.regression.sufficient_data import Comparison
+from irb140_jax.mismatch.regression.sufficient_data import Comparison, mostly_lost
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.robot import Robot
@@ -31,9 +31,11 @@ def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]
     robot, band = data.robot, data.band
     out = [f"Model {robot.name}: {_sentence(note)}" for note in robot.notes]
     out += [f"{r.source}: {_sentence(note)}" for r in data.smooth for note in r.notes]
-    for name, count, enough in zip(robot.joint_names, data.rows, judged, strict=True):
+    for name, count, lost, enough in zip(robot.joint_names, data.rows, mostly_lost(data.smooth), judged, strict=True):
         if not enough:
-            out.append(f"{name} is not judged: it moves in only {count} usable rows; record motion of this joint.")
+            why = f"dead or frozen channels and gaps leave {count} usable rows of it" if lost else (
+                f"it moves in only {count} usable rows; record motion of this joint")
+            out.append(f"{name} is not judged: {why}.")
     out.append(
         f"The model's inertial parameters are assumed to be right to {100 * uncertainty:.3g} %, one standard deviation "
         "(--inertial-uncertainty)."
@@ -112,8 +114,8 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
     ]
 
 
-def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
-    """A note for every joint whose friction differs from recording to recording.
+def friction_notes(ex: Explanation, names: Sequence[str], judged: np.ndarray) -> list[str]:
+    """A note for every judged joint whose friction differs from recording to recording.
 
     Said where friction of its own for each recording is more probable than one for all, against the odds of any rare
     effect.
@@ -121,6 +123,7 @@ def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
     Args:
         ex: The explanation.
         names: Of the recordings.
+        judged: Joints of which enough rows tell, shape (n,).
     """
     out = []
     _, _, own = ex.prediction()
@@ -129,7 +132,7 @@ def friction_notes(ex: Explanation, names: Sequence[str]) -> list[str]:
         alike = (*ex.hyper[:j], one_level, *ex.hyper[j + 1 :])
         gain = ex.space.log_evidence(ex.chosen, ex.hyper) - ex.space.log_evidence(ex.chosen, alike)
         levels = ex.extra[0].groups[j] == FRICTION_LEVELS
-        if levels.any() and gain > -np.log(settings.RARE):
+        if judged[j] and levels.any() and gain > -np.log(settings.RARE):
             units = ("N", "N s/m") if ex.lib.robot.is_slide[j] else ("N m", "N m s/rad")
             dry, fast = (own[j] * ex.extra[0].units[j])[levels].reshape(2, -1)
             said = ", ".join(

@@ -124,6 +124,11 @@ def usable_rows(smooth: Sequence[Conditioned], band: Band) -> np.ndarray:
     return np.sum([r.usable[band.kept(len(r.t))].sum(axis=0) for r in smooth], axis=0)
 
 
+def mostly_lost(smooth: Sequence[Conditioned]) -> np.ndarray:
+    """Whether dead or frozen channels and gaps took most rows of each joint, shape (n,)."""
+    return np.concatenate([r.recorded for r in smooth]).mean(axis=0) < 0.5
+
+
 def too_little(smooth: Sequence[Conditioned], band: Band) -> str:
     """Why no joint at all can be compared, and what to record; empty where one can."""
     rows = sum(len(band.kept(len(r.t))) for r in smooth)
@@ -134,8 +139,10 @@ def too_little(smooth: Sequence[Conditioned], band: Band) -> str:
         )
     most = int(usable_rows(smooth, band).max())
     if most < settings.FEWEST_ROWS_OF_JOINT:
+        what = "Dead or frozen channels spoil every joint" if mostly_lost(smooth).all() else (
+            "No joint moves for long enough")
         return (
-            f"No joint moves for long enough: at most {most} samples of one can be compared with the model, and "
+            f"{what}: at most {most} samples of one can be compared with the model, and "
             f"{settings.FEWEST_ROWS_OF_JOINT} are needed: {MORE}"
         )
     return ""
