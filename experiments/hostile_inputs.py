@@ -225,6 +225,7 @@ class Arm:
             yield case(f"{column[:3]} once missing", put(column, one, None), False)
             yield case(f"{column[:3]} half missing", put(column, slice(0, n // 2), None), False)
             yield case(f"{column[:3]} constant", put(column, every, 0.5))
+            yield case(f"{column[:3]} all zero", put(column, every, 0.0))
         yield case("time backwards", lambda d: d[::-1])
         yield case("time shuffled", lambda d: d.sample(frac=1.0, random_state=1))
         yield case("time in milliseconds", lambda d: d.assign(t=1e3 * d["t"]))
@@ -361,12 +362,19 @@ class Harness:
         self.reached, self.notes = False, set[str]()
         import irb140_jax.mismatch  # noqa: F401
 
+        module = sys.modules["irb140_jax.mismatch.diagnose"]
+        too_little = getattr(module, "too_little")  # noqa: B009
+
         def explain(robot, recordings, *_, **__):
             self.reached = True
             self.notes = {note for r in recordings for note in r.notes}
             raise InputError("stopped before the search")
 
-        setattr(sys.modules["irb140_jax.mismatch.diagnose"], "explain", explain)  # noqa: B010
+        def nothing_to_search(smooth, band):
+            return explain(None, smooth) if too_little(smooth, band) else ""
+
+        setattr(module, "explain", explain)  # noqa: B010
+        setattr(module, "too_little", nothing_to_search)  # noqa: B010
 
     def run(self, case: Case) -> Outcome:
         """One case, in a folder that is made for it and removed afterwards."""
