@@ -30,7 +30,7 @@ from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted, unproved
 from irb140_jax.mismatch.validation.testable import reference, visibility
-from irb140_jax.mismatch.validation.undecided_joints import mostly_unexplained
+from irb140_jax.mismatch.validation.undecided_joints import made_worse
 from irb140_jax.mismatch.validation.unexplained import unexplained
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
@@ -107,8 +107,8 @@ def _diagnosed(
     refit = refitted(ex)
     logged, left = [s.tau for s in ex.data.stretches], held_out(ex, refit)
     corrected = _corrected(data, ex, refit, left, config)
-    # Without them others may be found to explain nothing, too.
-    while (fewer := ex.not_only_on(mostly_unexplained(corrected[2], logged, np.hypot(*sensors)))).chosen != ex.chosen:
+    # Without them others may make it worse, too.
+    while (fewer := ex.not_only_on(made_worse(corrected[2], logged, np.hypot(*sensors)))).chosen != ex.chosen:
         ex, left = fewer, held_out(fewer, refit)
         corrected = _corrected(data, ex, refit, left, config)
     progress("looking for structure that no effect explains")

@@ -97,7 +97,7 @@ def check_motion(recording: Recording, seen: Glance, robot: Robot) -> Recording:
     moving = seen.travel > least(MOVING)
     if recording.has_torque:
         recording = with_lost_torque_marked(recording, least(MOVING), robot)
-        if np.all((np.ptp(recording.tau, axis=0) == 0.0) | ~moving):
+        if moving.any() and not np.ptp(recording.tau[:, moving], axis=0).any():
             raise RecordingError(f"{source}: no moving joint has a torque that changes: columns "
                                  f"{', '.join('tau.' + names[j] for j in np.flatnonzero(moving))} are dead channels; "
                                  "log motor torques or currents, or map the columns that hold them with --columns "

@@ -11,6 +11,7 @@ from irb140_jax.mismatch.regression.gaussian import eliminated, gain_of
 from irb140_jax.mismatch.result import Finding, Fit, Verdict
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.mismatch.validation.undecided_joints import without_effects
 from irb140_jax.mismatch.validation.unexplained import Structure
 from irb140_jax.robot import Robot
 
@@ -26,12 +27,12 @@ def verdict(
     removes more of an open joint's error than is left there: then the open joints are a note.  Also where nothing is
     found and ordinary friction would not show on any joint (`blind`).
     """
-    nominal, refit, corrected = (proof.rmse(x) for x in (proof.nominal, proof.refit, proof.corrected))
+    nominal, corrected = proof.rmse(proof.nominal), proof.rmse(proof.corrected)
     named = np.sqrt(np.clip(nominal**2 - corrected**2, 0.0, None))
     names = ex.lib.robot.joint_names
     at = {names.index(joint) for finding in found for joint in finding.joints}
-    without = np.minimum(nominal, refit)  # of joints that mean something else, a refit may err more than the model
-    decided = any(j not in open_ or without[j] ** 2 > 2.0 * corrected[j] ** 2 for j in at)
+    explained = without_effects(proof) ** 2 > 2.0 * corrected**2
+    decided = any(j not in open_ or explained[j] for j in at)
     if any(not found or u.rms > named[u.joint] for u in rest):
         return "unexplained"
     if open_ and not decided:

@@ -20,13 +20,22 @@ def torque_size(proof: HeldOut, torque: Sequence[np.ndarray]) -> np.ndarray:
     return out
 
 
-def mostly_unexplained(proof: HeldOut, torque: Sequence[np.ndarray], scatter: np.ndarray) -> np.ndarray:
-    """Joints of which an explanation leaves most of the torque, and more than the sensors do, shape (n,).
+def made_worse(proof: HeldOut, torque: Sequence[np.ndarray], scatter: np.ndarray) -> np.ndarray:
+    """Joints whose error on unseen data an explanation makes larger, to more than half of the torque, shape (n,).
 
     The model is not of such a joint, or its columns are another's; evidence is then between laws that are all wrong.
     """
     left, size = proof.rmse(proof.corrected), torque_size(proof, torque)
-    return proof.judged & (left > np.maximum(settings.LARGE_ERROR * size, settings.ABOVE_NOISE * scatter))
+    large = left > np.maximum(settings.LARGE_ERROR * size, settings.ABOVE_NOISE * scatter)
+    return proof.judged & large & (left > without_effects(proof))
+
+
+def without_effects(proof: HeldOut) -> np.ndarray:
+    """Error on unseen data of the model as given or refitted, whichever is better at each joint, shape (n,).
+
+    Where columns mean something else, a refit errs more than the model as given.
+    """
+    return np.minimum(proof.rmse(proof.nominal), proof.rmse(proof.refit))
 
 
 def undecidable(
@@ -54,8 +63,7 @@ def undecidable(
         elif left[j] > settings.LARGE_ERROR * size[j]:
             out[int(j)] = (
                 f"the remaining error of {name}, {left[j]:.3g} {unit}, is {100 * left[j] / max(size[j], 1e-300):.0f} % "
-                "of its torque and may hide anything, so no effect is named on it alone: check its columns and "
-                "units, and record faster or longer motion"
+                "of its torque and may hide anything: check its columns and units, and record faster or longer motion"
             )
         elif left[j] > max(settings.NOT_SMALL * size[j], settings.ABOVE_NOISE * scatter[j]):
             times, share = left[j] / max(scatter[j], 1e-300), 100 * left[j] / max(size[j], 1e-300)
