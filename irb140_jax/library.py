@@ -127,7 +127,9 @@ def diagnose(
         if r.joint_names != arm.joint_names:
             raise InputError(f"diagnose: {r.source} holds joints {', '.join(r.joint_names)}; the robot {arm.name} has "
                              f"{', '.join(arm.joint_names)}")  # fmt: skip
-    config = DiagnoseConfig(inertial_uncertainty=inertial_uncertainty)
+    files = {"--robot": None if isinstance(robot, Robot) else robot, "--columns": columns, "--out": "DIR"}
+    words = tuple(word for option, path in files.items() if path is not None for word in (option, os.fspath(path)))
+    config = DiagnoseConfig(inertial_uncertainty=inertial_uncertainty, words=words)
     return Diagnosis(mismatch.diagnose(arm, read, config, progress))
 
 

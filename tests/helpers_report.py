@@ -81,7 +81,7 @@ def example_document() -> dict:
         ],
         "provenance": {
             "version": "0.1.0",
-            "command": "irb140 diagnose wave_1.csv wave_2.csv wave_3.csv --inertial-uncertainty 0.05",
+            "command": "irb140 diagnose wave_1.csv wave_2.csv wave_3.csv --out d --inertial-uncertainty 0.05",
             "robot": {"name": "irb140", "joints": list(JOINTS), "sha256": "5e" * 32},
             "recordings": [
                 {"file": f"wave_{i}.csv", "sha256": f"{i}a" * 32, "rows": 7501, "rate": 250.0, "duration": 30.0}

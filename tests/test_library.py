@@ -1,6 +1,7 @@
 """The library's front door: what a person meets who writes `import irb140_jax as irb`."""
 
 import pathlib
+import shlex
 import subprocess
 import sys
 
@@ -61,7 +62,9 @@ def test_a_diagnosis_shows_itself_saves_itself_and_predicts(diagnosis, recording
     assert diagnosis.verdict in repr(diagnosis) and "elbow" in diagnosis._repr_html_()
     folder = diagnosis.save(tmp_path / "out")
     assert (folder / "diagnosis.json").is_file()
-    assert f"irb140 predict {folder}" in (folder / "report.html").read_text()
+    page, (file,) = (folder / "report.html").read_text(), shlex.split(diagnosis.document["provenance"]["command"])[2:3]
+    assert f"irb140 predict {folder}" in page and pathlib.Path(file).is_file()
+    assert f"irb140 diagnose {file} recorded.csv --robot " in page and f"--out {folder}-2" in page
     errors = {k: np.std(v[:, 1] - recording.tau[:, 1]) for k, v in diagnosis.predict(recording).items()}
     assert errors["corrected"] < 0.7 * errors["nominal"]
     q = jnp.zeros(2)

@@ -54,7 +54,7 @@ irb140 demo --seed 7 --out demo     another effect, joint and strength"""
         terminal = console(stderr=self.json)
         said = f"Something may be hidden in these recordings. SHA-256 of the truth: {case.seal}"
         terminal.print(said, soft_wrap=True)
-        result = _from_files(case, results.workspace)
+        result = _from_files(case, results.workspace, out)
         reveal = revealed(case.truth["effects"], result.diagnosis, case.seal)
         folder = results.write(lambda folder: _write(result, reveal, case, results.workspace, folder, out))
         tell_kept(results)
@@ -62,8 +62,8 @@ irb140 demo --seed 7 --out demo     another effect, joint and strength"""
         print_reveal(reveal, terminal)
 
 
-def _from_files(case: "ConcealedCase", workspace: pathlib.Path) -> "Result":
-    """The diagnosis of the recordings as files, the same that `irb140 diagnose` would make of them."""
+def _from_files(case: "ConcealedCase", workspace: pathlib.Path, out: pathlib.Path) -> "Result":
+    """The diagnosis of the recordings as files, the same that `irb140 diagnose` would make of them in `out`."""
     from irb140_jax.recordings import read_recording, write_recording
     from irb140_jax.robot import irb140
 
@@ -71,7 +71,11 @@ def _from_files(case: "ConcealedCase", workspace: pathlib.Path) -> "Result":
     for recording, path in zip(case.recordings, paths, strict=True):
         write_recording(recording, path)
     robot = irb140()
-    return diagnosed(robot, [read_recording(path, robot) for path in paths])
+    read = [
+        dataclasses.replace(read_recording(path, robot), path=str(out / path.relative_to(workspace))) for path in paths
+    ]
+    # `out` holds the recordings, so the diagnosis alone is repeated into another folder.
+    return diagnosed(robot, read, words=("--out", f"{out}-2"))
 
 
 def _write(

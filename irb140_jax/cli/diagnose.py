@@ -111,11 +111,11 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
         (folder / "report.html").write_text(html_report(result.diagnosis, result.views, folder=out), encoding="utf-8")
 
     def _words(self) -> tuple[str, ...]:
-        """Options that name files or joints, as the diagnosis keeps them."""
+        """Options that name files, folders or joints, as the diagnosis keeps them."""
         files = {"--robot": self.robot, "--columns": self.columns}
-        named = [word for option, path in files.items() if path for word in (option, path.name)]
+        named = [word for option, path in files.items() if path for word in (option, str(path))]
         held = [word for joint in self.hold for word in ("--hold", joint)]
-        return (*named, *held, *(["--fix-base"] if self.fix_base else []))
+        return (*named, *held, *(["--fix-base"] if self.fix_base else []), "--out", str(self.out))
 
 
 def diagnosed(

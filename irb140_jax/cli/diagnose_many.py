@@ -120,12 +120,14 @@ class Work:
         from irb140_jax.report.made import write_manifest
 
         set_up_compilation_cache()
-        unit, folder = task.unit, task.folder
+        unit, folder, place = task.unit, task.folder, task.place
         folder.mkdir()
+        # `irb140 diagnose` does not replace what another command wrote: the command that is kept names another folder.
         command = Diagnose(
-            unit.recordings, folder, unit.robot, self.inertial_uncertainty, unit.columns, self.hold, self.fix_base
+            unit.recordings, pathlib.Path(f"{place}-2"), unit.robot, self.inertial_uncertainty, unit.columns,
+            self.hold, self.fix_base,
         )
-        command.write(command.diagnosed(), folder, folder)
+        command.write(command.diagnosed(), folder, place)
         write_manifest(folder, "irb140 diagnose-many")
 
 

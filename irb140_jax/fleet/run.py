@@ -17,11 +17,12 @@ Diagnosing = Callable[["Task"], None]
 
 
 class Task(NamedTuple):
-    """A unit, the empty folder that its diagnosis is written into, and its key."""
+    """A unit, the empty folder that its diagnosis is written into, its key, and where the folder will lie."""
 
     unit: Unit
     folder: pathlib.Path
     key: str
+    place: pathlib.Path
 
 
 class Progress(NamedTuple):
@@ -62,7 +63,10 @@ def diagnose_units(units: Sequence[Unit], store: ResultsStore, work: Diagnosing,
         store.put(unit, store.key(unit), row_without(unit, "refused", unit.problem))
         done += 1
         yield Progress(unit.name, "refused", done, len(units), None)
-    tasks = [Task(unit, store.workspace / f"new-{unit.name}", store.key(unit)) for unit in open_ if not unit.problem]
+    tasks = [
+        Task(unit, store.workspace / f"new-{unit.name}", store.key(unit), store.folder(unit.name))
+        for unit in open_ if not unit.problem
+    ]  # fmt: skip
     tasks.sort(key=_size, reverse=True)  # the longest first, so that none of them is waited for in the end
     for k, one in enumerate(run_tasks(tasks, work, jobs), 1):
         status, done = _put(store, one), done + 1
@@ -72,7 +76,7 @@ def diagnose_units(units: Sequence[Unit], store: ResultsStore, work: Diagnosing,
 
 def _put(store: ResultsStore, one: Done) -> str:
     """Put what a process made into the store."""
-    unit, fresh, key = one.task
+    unit, fresh, key, _ = one.task
     if one.status != "diagnosed":
         shutil.rmtree(fresh, ignore_errors=True)
         store.put(unit, key, row_without(unit, one.status, one.message))

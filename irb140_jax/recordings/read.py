@@ -1,6 +1,7 @@
 """A file to a checked `Recording`: the way in for everything a user measured."""
 
 import dataclasses
+import os
 import pathlib
 import re
 from typing import Literal
@@ -48,7 +49,7 @@ def read_recording(
         RecordingError: It can't be used; the message says file, column, row (counted from 1 below the header), what is
             wrong and what would mend it.
     """
-    path = pathlib.Path(path)
+    named, path = os.fspath(path), pathlib.Path(path)
     recording = unchecked_recording(path, robot.joint_names, columns, torque=torque, known_joints=known_joints)
     if recording.is_servo_log and (drive is not None or recording.drive is None):
         stated = ColumnMap() if columns is None else read_column_map(columns, robot.joint_names, known_joints)
@@ -60,7 +61,7 @@ def read_recording(
         recording = check_against_model(recording, seen, robot)
     if recording.is_servo_log:
         check_commands(recording, robot)
-    return dataclasses.replace(recording, source=path.name, sha256=checksum(path))
+    return dataclasses.replace(recording, source=path.name, sha256=checksum(path), path=named)
 
 
 def unchecked_recording(

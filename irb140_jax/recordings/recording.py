@@ -38,6 +38,7 @@ class Recording:
             is then NaN until `recordings.servo` makes it.
         qddes: Commanded velocities of such a log [rad/s or m/s], shape (T, n), or None.
         drive: What is stated of the drives of such a log, or None.
+        path: The file it was read from, as it was named; empty where it comes from none.
     """
 
     t: Float[np.ndarray, " T"]
@@ -55,6 +56,7 @@ class Recording:
     qdes: Float[np.ndarray, "T n"] | None = None
     qddes: Float[np.ndarray, "T n"] | None = None
     drive: Drive | None = None
+    path: str = ""
 
     def __post_init__(self) -> None:
         shape = (len(self.t), len(self.joint_names))
@@ -90,7 +92,7 @@ def rows_of(recording: Recording, rows: slice, source: str | None = None) -> Rec
     return dataclasses.replace(
         recording, t=recording.t[rows], q=recording.q[rows], tau=recording.tau[rows], qd=cut(recording.qd),
         qdd=cut(recording.qdd), extras={k: v[rows] for k, v in recording.extras.items()},
-        source=recording.source if source is None else source, file_t=None, sha256="",
+        source=recording.source if source is None else source, file_t=None, sha256="", path="",
         torque_lost=cut(recording.torque_lost), qdes=cut(recording.qdes), qddes=cut(recording.qddes),
     )
 

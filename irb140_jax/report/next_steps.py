@@ -74,4 +74,7 @@ def _again(diagnosis: Diagnosis, folder: str) -> str:
     """The command of this diagnosis with one recording more."""
     words = shlex.split(diagnosis.provenance.command)
     words.insert(2 + len(diagnosis.provenance.recordings), "recorded.csv")
+    if "--out" in words:
+        at = words.index("--out")
+        del words[at : at + 2]
     return shlex.join([*words, "--out", f"{folder.rstrip('/')}-2"])

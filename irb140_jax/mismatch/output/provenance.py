@@ -33,10 +33,10 @@ def provenance(
         words: What the command line said beside the recordings and the uncertainty.
     """
     share = f"{options['inertial_uncertainty']:g}"
-    command = ["irb140", "diagnose", *(r.source for r in recordings), *words, "--inertial-uncertainty", share]
+    command = ["irb140", "diagnose", *(r.path or r.source for r in recordings), *words, "--inertial-uncertainty", share]
     return Provenance(
         version=_version(),
-        command=shlex.join(command),  # but for the folder that it is written to
+        command=shlex.join(command),
         robot=DiagnosedRobot(robot.name, robot.joint_names, _hash_of_robot(robot)),
         recordings=tuple(_of_recording(r) for r in recordings),
         options=dict(options),
