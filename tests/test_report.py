@@ -105,6 +105,7 @@ def test_the_first_table_has_every_finding_at_its_joints_and_what_is_not_judged(
     assert values["stribeck friction"] == ["", "8.431 ± 0.071", "", "", "", ""]
     assert values["transmission coupling"][4:] == ["2.310 ± 0.040"] * 2
     assert rows["stribeck friction"][1]["more"] == "N m · 97 %, 1 alternative"
+    assert rows["stribeck friction"][1]["kind"] == "sure open" and rows["transmission coupling"][4]["kind"] == "sure"
     assert values["error left"][3] == "not judged"
     assert "joint4 not judged" in Page(html_report(judged, views)).visible
 
@@ -289,6 +290,17 @@ def test_the_heat_map_is_blue_below_orange_above_and_empty_where_there_are_no_da
 def test_a_line_is_broken_where_a_value_is_missing():
     drawn = svg.line_plot([0, 1, 2, 3, 4], [svg.Series("s", [0.0, 1.0, None, 1.0, 0.0])], "t", "y")
     assert re.search(r'class="line s" d="M[\d. ]+L[\d. ]+M[\d. ]+L[\d. ]+"', drawn)
+
+
+@pytest.mark.parametrize(("low", "high"), [(1e-5, 9e-4), (1e-8, 3e-8), (0.2, 30.0)])
+def test_the_label_of_the_vertical_axis_stands_clear_of_those_of_its_ticks(low, high):
+    lines = [svg.Series("s", [low, high, -high])]
+    plots = [svg.line_plot([0, 1, 2], lines, "t", "y", log_y=log_y) for log_y in (True, False)]
+    for drawn in (*plots, svg.loop_plot([0, 1, 2], lines, "t", "y")):
+        (turned,) = re.findall(r'<text x="([\d.]+)"[^>]*rotate', drawn)
+        marks = re.findall(r'<text x="([\d.]+)"[^>]*"end">([^<]+)', drawn)
+        begin = [float(x) - 12 * sum(0.34 if c in svg.NARROW else 0.58 for c in label) for x, label in marks]
+        assert min(begin) > float(turned) + 3.0  # [px]: letters of 12 px hang 3 px below their line
 
 
 @pytest.mark.parametrize(("low", "high"), [(-4.2, -3.3), (-1.9, 0.4), (-6.0, 2.0)])

@@ -17,7 +17,8 @@ def overview(diagnosis: Diagnosis, joints: Sequence[str], units: Mapping[str, st
         units: Units of their torques.
 
     Returns:
-        Rows {"name", "cells": one {"value", "more", "kind"} for each joint}; `kind` is "sure", "open", "rest" or "".
+        Rows {"name", "cells": one {"value", "more", "kind"} for each joint}; `kind` holds "sure" where a
+        finding is probable, "open" where it has alternatives, "rest" where there is no name.
     """
     rows: dict[str, dict[str, dict]] = {}
     for finding in diagnosis.findings:
@@ -40,7 +41,8 @@ def _found(finding: Finding) -> dict:
     value, unit = (text.with_std(first.value, first.std), f"{first.unit} · ") if first else ("yes", "")
     rivals = len(finding.alternatives)
     more = unit + text.percent(p) + (f", {rivals} alternative{'s' if rivals > 1 else ''}" if rivals else "")
-    return {"value": value, "more": more, "kind": "sure" if p is not None and p >= SURE else "open"}
+    kind = ["sure"] * (p is not None and p >= SURE) + ["open"] * (rivals > 0)
+    return {"value": value, "more": more, "kind": " ".join(kind)}
 
 
 def _left(fit: Fit | None, unit: str) -> dict:

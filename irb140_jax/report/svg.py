@@ -5,6 +5,9 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+PHONE_FONT = 12.0  # of the labels on a phone, where they are largest [px]
+NARROW = ".·⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
+
 
 class Series(NamedTuple):
     """One line of a plot."""
@@ -63,6 +66,17 @@ def tick_text(value: float) -> str:
     return f"{value:.6g}".replace("-", "−").replace("e−0", "e−")
 
 
+def y_marks(y: tuple[float, float], log_y: bool, about: int) -> list[tuple[float, str]]:
+    """Place and label of the ticks of a vertical axis."""
+    return log_ticks(*y) if log_y else [(v, tick_text(v)) for v in ticks(*y, about)]
+
+
+def margin(marks: Sequence[tuple[float, str]], font: float = PHONE_FONT) -> float:
+    """Room at the left of a plotting area, in which the label of its axis stands clear of those of its ticks."""
+    widths = (font * sum(0.35 if c in NARROW else 0.6 for c in label) for _, label in marks)
+    return 1.5 * font + 6.0 + max(widths, default=0.0)
+
+
 def drawing(width: float, height: float, label: str, body: str) -> str:
     """An SVG element with a name for screen readers."""
     name = html.escape(label)
@@ -80,7 +94,7 @@ def axes(
     """Frame, ticks and labels of a plotting area; with `log_y` its vertical data are logarithms to base ten."""
     right, bottom, middle = box.left + box.width, box.top + box.height, box.top + box.height / 2
     parts = [f'<rect x="{box.left:g}" y="{box.top:g}" width="{box.width:g}" height="{box.height:g}" class="frame"/>']
-    for value, label in log_ticks(*box.y) if log_y else [(v, tick_text(v)) for v in ticks(*box.y, about[1])]:
+    for value, label in y_marks(box.y, log_y, about[1]):
         y = box.py(value)
         parts.append(f'<path class="grid" d="M{box.left:g} {y:.1f}H{right:g}"/>')
         parts.append(text(box.left - 6, y + 3.5, label, "end"))
@@ -105,15 +119,19 @@ def line_plot(
     log_y: bool = False,
     x_ticks: bool = True,
     name: str = "",
+    beside: Sequence[Series] = (),
 ) -> str:
-    """Lines over a common axis; gaps where a value is None."""
-    values = [v for s in series for v in s.y if v is not None and math.isfinite(v) and (v > 0 or not log_y)]
-    if not values or len(x) < 2:
+    """Lines over a common axis; gaps where a value is None.
+
+    The frame leaves room for the labels of the lines `beside`, too, so that two drawings can stand below each other.
+    """
+    ranges = [_y_range(lines, log_y) for lines in (series, beside)]
+    if ranges[0] is None or len(x) < 2:
         return ""
     scale = math.log10 if log_y else float
     bottom = 36 if x_ticks else 8
-    y = _widened(scale(min(values)), scale(max(values)))
-    box = Box(58, 8, size[0] - 68, size[1] - 8 - bottom, (x[0], x[-1]), y)
+    left = max(58.0, *(margin(y_marks(y, log_y, 4)) for y in ranges if y))
+    box = Box(left, 8, size[0] - 10 - left, size[1] - 8 - bottom, (x[0], x[-1]), ranges[0])
     body = [axes(box, x_label, y_label, x_ticks, log_y, about=(8 if size[0] > 400 else 5, 4))]
     body += [_line(box, s.name, x, [scale(v) if v is not None and (v > 0 or not log_y) else None for v in s.y])
              for s in series]  # fmt: skip
@@ -129,9 +147,18 @@ def loop_plot(
     places = [v for v in x if v is not None and math.isfinite(v)]
     if not values or len(places) < 2:
         return ""
-    box = Box(58, 8, size[0] - 68, size[1] - 44, _widened(min(places), max(places)), _widened(min(values), max(values)))
+    y = _widened(min(values), max(values))
+    left = max(58.0, margin(y_marks(y, False, 5)))
+    box = Box(left, 8, size[0] - 10 - left, size[1] - 44, _widened(min(places), max(places)), y)
     body = [axes(box, x_label, y_label, about=(4, 5)), *(_line(box, s.name, x, s.y) for s in series)]
     return drawing(*size, name or y_label, "".join(body))
+
+
+def _y_range(series: Sequence[Series], log_y: bool) -> tuple[float, float] | None:
+    """What a vertical axis shows of these lines; None where they hold no number."""
+    values = [v for s in series for v in s.y if v is not None and math.isfinite(v) and (v > 0 or not log_y)]
+    scale = math.log10 if log_y else float
+    return _widened(scale(min(values)), scale(max(values))) if values else None
 
 
 def _widened(low: float, high: float) -> tuple[float, float]:

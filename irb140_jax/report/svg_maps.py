@@ -11,6 +11,7 @@ Grid = Sequence[Sequence[float | None]]
 BLUES = ((8, 69, 148), (66, 146, 198), (158, 202, 225))
 ORANGES = ((253, 190, 133), (230, 85, 13), (140, 45, 4))
 DIVERGING = (*BLUES, (236, 236, 233), *ORANGES)
+PHONE_FONT = 14.0  # of the labels of maps on a phone [px], where a pair of them is narrow
 SHADES = 24  # distinct colours of a map; more can't be told apart and would only make the file longer
 
 
@@ -34,7 +35,8 @@ def heat_map(title: str, grid: Grid, rows: Sequence[float], columns: Sequence[fl
         unit: Unit of positions, rad or m.
         name: What a screen reader says, by default the title.
     """
-    box = svg.Box(48, 20, 168, 150, (columns[0], columns[-1]), (rows[0], rows[-1]))
+    left = max(48.0, svg.margin(svg.y_marks((rows[0], rows[-1]), False, 4), PHONE_FONT))
+    box = svg.Box(left, 20, 216 - left, 150, (columns[0], columns[-1]), (rows[0], rows[-1]))
     cells: dict[int, list[str]] = {}
     for i, row in enumerate(grid):
         top, bottom = box.py(rows[i + 1]), box.py(rows[i])

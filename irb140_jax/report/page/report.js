@@ -7,8 +7,8 @@
   const MODELS = ["nominal", "refit", "corrected"];
   const byId = (id) => document.getElementById(id);
   const jointBox = byId("joint"), recordingBox = byId("recording"), readout = byId("readout");
-  const LEFT = 62, TOP = 8, RIGHT = 10, BOTTOM = 38;
-  let plots = [], at = null;
+  const TOP = 8, RIGHT = 10, BOTTOM = 38;
+  let plots = [], at = null, LEFT = 62;
 
   const known = (v) => v !== null && v !== undefined && isFinite(v);
   const range = (lists) => {
@@ -29,6 +29,9 @@
   const shown = (v) => (known(v) ? String(parseFloat(v.toPrecision(4))).replace("-", "−") : "–");
   const tickText = (v) => String(parseFloat(v.toPrecision(6))).replace("-", "−");
   const escaped = (s) => s.replace(/[&<>"]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[c]);
+
+  // Room at the left of all drawings, so that no label of an axis lies on those of its ticks; 12 px at most is their font.
+  const margin = (lists, h) => 24 + 7.2 * Math.max(...ticks(range(lists), Math.max(2, h / 38)).map((v) => tickText(v).replace(/\./, "").length));
 
   // One drawing in `host`: lines [{name, x, y}], labels, and the curve {x, y} that the cursor follows.
   function plot(host, width, height, lines, xLabel, yLabel, follow, xRange) {
@@ -62,6 +65,7 @@
     const line = (x) => (name) => ({ name, x, y: m[name] });
     const missed = (name) => m[name].map((v, i) => (known(v) && known(m.measured[i]) ? m.measured[i] - v : null));
     const t = motion.t, wide = Math.max(300, byId("over-t").clientWidth || 640);
+    LEFT = Math.max(62, margin([m.measured, ...MODELS.map((name) => m[name])], 204), margin(MODELS.map(missed), 124), margin(data.motions.map((o) => o.joints[joint].qd), 204));
     plots = [];
     const whole = [t[0], t[t.length - 1]];
     plot(byId("over-t"), wide, 210, ["measured", ...MODELS].map(line(t)), "", `torque [${unit}]`, { x: "t", y: m.measured }, whole);
