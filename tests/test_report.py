@@ -133,7 +133,15 @@ def test_the_report_says_where_it_comes_from(diagnosis, page):
         assert f"{recording.file} {recording.rows} 250.0 30.00 {recording.sha256[:16]}" in page.visible
 
 
-def test_no_sentence_stands_twice_in_the_report(page):
+@pytest.mark.parametrize("shifts", [False, True])
+def test_no_sentence_stands_twice_in_the_report(diagnosis, views, shifts):
+    shifted = "Refitting changes the inertial parameters of the link behind link2 by 5.2 standard deviations."
+    if shifts:  # of which the summary speaks, too
+        diagnosis = dataclasses.replace(diagnosis, summary=f"{diagnosis.summary} {shifted}")
+        link = dataclasses.replace(views.inertials[0], sentence=shifted)
+        views = dataclasses.replace(views, inertials=(link, *views.inertials))
+    page = Page(html_report(diagnosis, views))
+    assert page.visible.count(shifted) == shifts
     sentences = [s.strip() for s in re.split(r"(?<=[.:])\s", page.visible) if len(s) > 40]
     assert len(sentences) > 10
     assert len(set(sentences)) == len(sentences)

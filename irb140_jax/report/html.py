@@ -3,6 +3,7 @@
 import json
 import pathlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from markupsafe import Markup
@@ -53,6 +54,8 @@ def html_report(
         panels=[figures.panel(joint, units[joint], views.motions) for joint in joints if views.motions],
         spectra=[figures.spectrum(joint, data, units[joint]) for joint, data in views.residual_spectrum.items()],
         motion=motion_section(views.motion) if views.motion else None,
+        # What the summary says of a link is not said again in the table.
+        inertials=[replace(x, sentence="") if x.sentence in diagnosis.summary else x for x in views.inertials],
         ranking=_bars(views.ranking),
         models=MODELS,
         first_joint=_first_joint(diagnosis, joints),
