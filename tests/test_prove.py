@@ -1,6 +1,7 @@
 """What counts as proof on unseen data, where some of the data are the only ones to tell of something."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from helpers_recordings import motion, recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
+from irb140_jax.mismatch.output.findings import findings
 from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gram import JointGram
 from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
@@ -80,6 +82,14 @@ def test_a_finding_is_worth_on_unseen_data_what_is_lost_without_it(alike):
     gains = held_out_gains(alike)
     assert set(gains) == set(alike.chosen)
     assert all(0.0 < gain < 1.0 for gain in gains.values())
+
+
+def test_a_findings_sentence_says_what_it_is_compared_with_on_unseen_data(alike):
+    # The table of errors compares with inertials near those stated, so the same share of its errors would be wrong.
+    for finding in findings(robot(), alike):
+        share, said = re.findall(r"adding it removes ([\d.]+) % of the squared error that (.*)", finding.certain)[0]
+        assert float(share) == pytest.approx(100.0 * (finding.evidence.heldout_gain or 0.0), abs=0.5)
+        assert said.startswith("inertial parameters of any size and the other findings, fitted in its place, leave on")
 
 
 def contradicted(ex: Explanation, index: int, recording: int) -> Explanation:

@@ -31,7 +31,8 @@ class Evidence:
     Attributes:
         log_odds: Natural logarithm of its posterior odds against the explanation without it.
         probability: That it acts at its joints, instead of one of its alternatives or nothing.
-        heldout_gain: Share of the squared error on unseen data that it removes.
+        heldout_gain: Share that it removes of the squared error which inertial parameters of any size and the other
+            findings, fitted in its place, leave on unseen data; of all joints, each in units of its noise.
     """
 
     log_odds: float | None

@@ -21,7 +21,7 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
         index: The finding.
         w: Its amplitudes, shape (k,).
         cov: Their covariance, shape (k, k).
-        gain: Share of the squared error on unseen data that it removes.
+        gain: Share that it removes of the squared error which the rest of the model, fitted in its place, leaves.
     """
     c = ex.data.candidates[index]
     columns = ex.data.nuisances + c.columns
@@ -39,7 +39,11 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
         for j in listed
     ]
     said = f"Besides the rigid-body model, a torque of {_listed(sizes)} is needed"
-    said += f"; adding it removes {_percent(float(np.clip(gain, 0.0, 0.9999)))} of the squared error on unseen data"
+    # Inertial parameters that may be anything take up most of some torques, so the share can be small.
+    others = any(i != index and not ex.data.candidates[i].is_inertials for i in ex.chosen)
+    said += f"; adding it removes {_percent(float(np.clip(gain, 0.0, 0.9999)))} of the squared error that inertial "
+    said += f"parameters of any size{' and the other findings' * others}, fitted in its place, leave on unseen data of "
+    said += "all joints, each in units of its noise"
     if len(c.joints) == 1 and (c.effect.place.is_friction or c.slug in LEVELS):
         said += _mean_by_direction(robot, ex, c.joints[0], columns, w, cov)
     return said + "."
