@@ -31,7 +31,7 @@ def draw(lines: list[dict[str, Any]], path: pathlib.Path) -> None:
                        (right, "level of the interval", "share that holds the truth")):  # fmt: skip
         axes.plot([0, 1], [0, 1], color="0.6", lw=0.8)
         axes.set(xlabel=x, ylabel=y, xlim=(0, 1.03), ylim=(0, 1.03))
-        axes.legend(frameon=False, loc="upper left")
+        axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0))  # error bars may be anywhere inside
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, metadata={"Date": None})
     plt.close(figure)

@@ -97,6 +97,11 @@ def test_wrong_words_on_the_command_line_give_one_line_that_names_them(words, na
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("words", [("frob",), ("diagnose", "a.csv", "--out", "d", "--frobnicate", "3")])
+def test_what_is_wrong_with_the_words_is_said_once(words, capsys):
+    assert refused(capsys, *words).lower().count("unrecognized options") == 1
+
+
 def test_a_recording_that_is_not_there_is_named_and_nothing_is_written(tmp_path):
     done = irb140("diagnose", "absent.csv", "--out", "d", cwd=tmp_path)
     assert done.returncode == 2

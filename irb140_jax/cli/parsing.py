@@ -44,8 +44,10 @@ def parsed(argv: Sequence[str] | None) -> Any:
         if stop.code in (0, None):
             print(_examples(words))
             raise
-        message = " ".join(re.sub(r"\x1b\[[0-9;]*m|[─│╭╮╰╯]", " ", said.getvalue()).split())
-        raise InputError(message) from None
+        box = r"\x1b\[[0-9;]*m|[─│╭╮╰╯]|^\+-|-{3,}\+?|^\||\|$"  # the lines of a plain terminal, too
+        message = " ".join(re.sub(box, " ", said.getvalue(), flags=re.MULTILINE).split())
+        # The box's text may repeat its heading.
+        raise InputError(re.sub(r"^(.+?) \1\b", r"\1", message)) from None
 
 
 def _examples(words: Sequence[str]) -> str:
