@@ -9,7 +9,7 @@ from irb140_jax.mismatch.output.views import MODELS, Maps, Spectrum, Traces
 from irb140_jax.report import svg, svg_maps, text
 
 FULL_COLOUR = 0.98  # share of cells below the full colour, so that a single bad cell can't wash out a map
-MOST_POINTS = 500  # of a line on paper; the page's script draws all of them
+MOST_POINTS = 350  # of a line on paper; the page's script draws all of them
 
 
 def map_pair(data: Maps) -> dict:
