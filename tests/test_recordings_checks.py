@@ -15,7 +15,8 @@ from scipy.spatial.transform import Rotation
 import irb140_jax as irb
 from irb140_jax.errors import RecordingError
 from irb140_jax.recordings import Recording, read_recording, write_recording
-from irb140_jax.robot import irb140, irb140_path
+from irb140_jax.recordings.conceal import demo_case
+from irb140_jax.robot import irb140, irb140_path, robot_from_model
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +27,12 @@ def robot():
 @pytest.fixture(scope="module")
 def sound() -> Recording:
     return made.recording()
+
+
+@pytest.fixture(scope="module")
+def shipped() -> tuple[Recording, ...]:
+    """Sound recordings of the IRB 140, of the demo."""
+    return demo_case(1, duration=8.0).recordings
 
 
 def read(recording, robot, tmp_path):
@@ -135,6 +142,41 @@ def test_torque_in_another_unit_is_refused_with_the_factor_that_mends_it(tmp_pat
     assert ("mN m" in message) == (factor == 1000.0)
     (said,) = re.findall(rf'"tau.{sound.joint_names[0]}" = (\S+?),? ', message + " ")
     assert float(said) == pytest.approx(1.0 / factor, rel=0.1)
+
+
+@pytest.mark.parametrize("factor", [0.15, 0.05, 0.01])
+def test_torque_of_the_irb_140_on_the_motors_side_is_not_taken_for_degrees(shipped, tmp_path, factor):
+    for recording in shipped:
+        message = refusal(changed(recording, tau=factor * recording.tau), irb140(), tmp_path)
+        (said,) = re.findall(r'"tau.joint2" = (\S+?),? ', message + " ")
+        assert "degrees" not in message and "gear ratio" in message
+        assert float(said) == pytest.approx(1 / factor, rel=0.2)
+
+
+@pytest.mark.parametrize("factor", [0.01, 1000.0])
+def test_torque_of_one_joint_in_another_unit_is_refused_and_no_other_joint_is_named(shipped, tmp_path, factor):
+    for recording in shipped:
+        tau = recording.tau * np.where(np.arange(6) == 1, factor, 1.0)
+        message = refusal(changed(recording, tau=tau), irb140(), tmp_path)
+        (said,) = re.findall(r'would be "tau.joint2" = (\S+)$', message)
+        assert "column tau.joint2 has the shape" in message and float(said) == pytest.approx(1 / factor, rel=0.25)
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_torque_of_one_joint_in_another_unit_is_refused_on_an_arm_of_three(sound, robot, tmp_path, joint):
+    tau = sound.tau * np.where(np.arange(3) == joint, 0.01, 1.0)
+    assert f"tau.{sound.joint_names[joint]} has the shape" in refusal(changed(sound, tau=tau), robot, tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rotor_or_a_load_that_makes_a_wrists_torque_a_hundred_times_as_large_is_no_other_unit(tmp_path, seed):
+    light = made.model()
+    light.body_mass[-1:], light.body_inertia[-1:] = 0.005, 1e-5
+    robot = robot_from_model(light, source="a wrist of nearly no mass")
+    passes(made.recording(seed=seed, friction=0.0), robot, tmp_path)
+    geared = made.recording(seed=seed, friction=0.0, arm=light)
+    rotor = 0.1 * np.gradient(made.motion(3, seed=seed)[2][:, 2], geared.t)
+    passes(changed(geared, tau=geared.tau + rotor[:, None] * np.array([0, 0, 1.0])), robot, tmp_path)
 
 
 def test_torque_in_percent_of_the_rated_is_refused(sound, robot, tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment, nnls
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.channels import channel_doubts, lateness
+from irb140_jax.recordings.channels import channel_doubts, lateness, ratio_to_model
 from irb140_jax.recordings.check import MOVING
 from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.recording import Recording
@@ -123,9 +123,14 @@ def _check_angles(recording: Recording, seen: Glance, robot: Robot, model: Torqu
     # As degrees, the same numbers are a motion 57 times slower: one of the two agrees with the torque.
     other = nominal_torques(robot, *(x * to_radians for x in (seen.q, seen.qd, seen.qdd)))
     degrees = np.median(_misfit(seen.tau, other.total)[hinges])
-    if given > 5.0 and degrees < 1.2 and far > 2.0 or given > 1.0 and degrees < 0.4 and far > 2 * np.pi:
+    # A torque of the shape that the model has in radians is rather in another unit, unless degrees tell its size, too.
+    shaped = np.median([ratio_to_model(seen, model, int(j)) for j in np.flatnonzero(hinges)]) > 0.0
+    if given > 5.0 and degrees < (0.4 if shaped else 1.2) and far > 2.0 or (
+        given > 1.0 and degrees < 0.4 and far > 2 * np.pi
+    ):
         raise RecordingError(f"{source}: the columns q.* look like degrees: in radians the model's torque is off by "
-                             f"{given:.1f} times what is logged, in degrees by {degrees:.1f} times; {remedy}")
+                             f"{given:.1f} times what is logged, in degrees by {degrees:.1f} times; {remedy}; "
+                             "if q is in radians, tau is in another unit")
 
 
 def _reversed(seen: Glance, model: Torques, driven: np.ndarray) -> np.ndarray:
