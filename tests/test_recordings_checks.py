@@ -237,6 +237,25 @@ def test_a_drive_that_lags_by_much_is_no_reversed_torque(tmp_path):
     assert "comes about 3" in " ".join(recording.notes)
 
 
+def later(recording, delay):
+    tau = np.stack([np.interp(recording.t - delay, recording.t, x) for x in recording.tau.T], axis=1)
+    return changed(recording, tau=tau)
+
+
+@pytest.mark.parametrize("delay", [0.155, -0.1])
+def test_torque_that_is_out_of_step_by_more_than_a_diagnosis_finds_is_stated(shipped, sound, robot, tmp_path, delay):
+    for recording, arm in [*((r, irb140()) for r in shipped), (sound, robot)]:
+        (said,) = re.findall(r"most joints comes about (\d+) ms (\w+)", " ".join(read(later(recording, delay), arm,
+                                                                                         tmp_path).notes))  # fmt: skip
+        assert float(said[0]) == pytest.approx(1000 * abs(delay), abs=10) and (said[1] == "after") == (delay > 0)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.025])
+def test_delays_that_a_diagnosis_finds_are_no_note_of_the_reading(shipped, sound, robot, tmp_path, delay):
+    for recording, arm in [*((r, irb140()) for r in shipped), (sound, robot)]:
+        assert read(later(recording, delay), arm, tmp_path).notes == ()
+
+
 def test_a_dead_torque_leaves_its_joint_out_and_says_so(sound, robot, tmp_path):
     tau = sound.tau.copy()
     tau[:, 1] = 0.0

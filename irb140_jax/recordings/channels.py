@@ -316,15 +316,36 @@ def lateness(recording: Recording, seen: Glance, model: Torques, j: int) -> floa
         model: Torque of the nominal model.
         j: The joint.
     """
-    step = (recording.t[-1] - recording.t[0]) / len(seen.tau)
-    features = _features(seen.qd[:, j], model.total[:, j])
-    turned = _share(features, -seen.tau[:, j])
+    step = _step(recording, seen)
     # A slow wave turned round is nearly the wave half a period late.
+    turned = _share(_features(seen.qd[:, j], model.total[:, j]), -seen.tau[:, j])
     best = 1.0 - min(1.0 - WELL, (1.0 - turned) / 2.0), 0
-    for k in range(1, int(LATEST / step) + 1):
-        share = _share(features[:-k], seen.tau[k:, j])
-        best = max(best, (share, k))
-    return best[1] * step
+    return max(best, *((_share_later(seen, model, j, k), k) for k in range(1, int(LATEST / step) + 1)))[1] * step
+
+
+def lateness_of_all(recording: Recording, seen: Glance, model: Torques, judged: np.ndarray) -> float:
+    """Time by which all torques must be moved ahead for the model to explain most of them [s], below 0 if moved back.
+
+    Returns:
+        0 where that isn't clear.
+    """
+    step, joints = _step(recording, seen), np.flatnonzero(judged)
+    shifts = np.arange(-int(LATEST / step), int(LATEST / step) + 1)
+    left = 1.0 - np.array([[_share_later(seen, model, int(j), int(k)) for j in joints] for k in shifts])
+    best = int(np.argmin(np.sum(np.log(left + 0.01), axis=1)))
+    clear = (left[best] < 1.0 - WELL) & (BETTER * left[best] < left[shifts == 0][0])
+    return float(shifts[best] * step) if 2 * clear.sum() > len(joints) else 0.0
+
+
+def _step(recording: Recording, seen: Glance) -> float:
+    return float(recording.t[-1] - recording.t[0]) / len(seen.tau)
+
+
+def _share_later(seen: Glance, model: Torques, j: int, k: int) -> float:
+    """Share of a joint's torque that is explained by the model k samples before."""
+    rows = slice(0, len(seen.tau) - k) if k >= 0 else slice(-k, None)
+    later = slice(k, None) if k >= 0 else slice(0, k)
+    return _share(_features(seen.qd[:, j], model.total[:, j])[rows], seen.tau[later, j])
 
 
 # --- units -----------------------------------------------------------------------------------------------------------

@@ -9,8 +9,9 @@ import dataclasses
 import numpy as np
 from scipy.optimize import linear_sum_assignment, nnls
 
+from irb140_jax.effects.delay import HALVES
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.channels import channel_doubts, lateness, ratio_to_model
+from irb140_jax.recordings.channels import channel_doubts, lateness, lateness_of_all, ratio_to_model
 from irb140_jax.recordings.check import MOVING
 from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.recording import Recording
@@ -19,6 +20,7 @@ from irb140_jax.robot import Robot
 
 FAR = 20.0  # rad; three turns: beyond the reach of any joint that has limits
 CERTAIN, NONE = 0.7, 0.15  # shares of a torque's variance that count as explained and as not explained
+LONGEST_DELAY = 2.0 * max(HALVES)  # s; a diagnosis finds shorter ones itself
 MIN_SHARE = 0.4  # of the model's torque that a joint must log to have a sign or a place worth judging
 
 
@@ -26,7 +28,7 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Rec
     """Refuse a recording whose positions are in degrees or whose channels have a wrong unit, sign, zero or joint.
 
     Returns:
-        The recording, with a note where a torque comes so late that it looks reversed.
+        The recording, with a note where torque comes so late that it looks reversed, or that no diagnosis finds it.
 
     Raises:
         RecordingError: The nominal model says so beyond doubt.
@@ -46,6 +48,11 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Rec
         raise RecordingError(f"{recording.source}: {doubt.said}: {doubt.remedy}")
     said = [f"tau.{recording.joint_names[j]} comes about {1000 * delay:.0f} ms after what the model needs: a drive "
             "that lags, or channels out of step" for j, delay in late.items() if delay > 0.0]  # fmt: skip
+    if not said and abs(delay := lateness_of_all(recording, seen, model, moving)) > LONGEST_DELAY:
+        when = "after" if delay > 0.0 else "before"
+        said = [f"The torque of most joints comes about {abs(1000 * delay):.0f} ms {when} what the model needs: drives "
+                "that lag, or channels out of step. Shift the torque by as much in time: a diagnosis finds delays up "
+                f"to {1000 * LONGEST_DELAY:.0f} ms, and takes a longer one for something else"]  # fmt: skip
     return dataclasses.replace(recording, notes=(*recording.notes, *said))
 
 
