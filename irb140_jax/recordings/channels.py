@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
+from irb140_jax.effects.encoder_offset import LARGEST
 from irb140_jax.recordings.glance import ENDS, SAMPLES, Glance, glance
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.repair import longest_run
@@ -282,28 +283,32 @@ def _hypotheses(
             "gravity", tuple(np.flatnonzero(judged).tolist()), "gravity in the model looks reversed: turned round, the "
             "model explains the torque", "turn `gravity` round in the model, or mend how its base is mounted", {},
         ), explained(seen, Torques(-model.gravity, model.moving), judged)  # fmt: skip
-        # The first joint's zero is how the base is mounted.
-        for j in np.flatnonzero(judged & ~np.asarray(robot.is_slide))[1:]:
+        for j in np.flatnonzero(judged & ~np.asarray(robot.is_slide)):
             yield from _zeros(recording, seen, robot, judged, int(j))
 
 
 def _zeros(
     recording: Recording, seen: Glance, robot: Robot, judged: np.ndarray, j: int
 ) -> Iterator[tuple[float, Doubt, np.ndarray]]:
-    """The best zero of a joint that is not near the one given."""
+    """The best zero of a joint, if it is farther from the one given than a diagnosis reaches."""
     step = np.eye(robot.n)[j]
 
     def at(offset: float) -> np.ndarray:
         return explained(seen, nominal_torques(robot, seen.q + offset * step, seen.qd, seen.qdd), judged)
 
-    tried = {z: at(z) for z in np.arange(-np.pi, np.pi, ZERO_STEP) if abs(z) > ZERO_STEP}
+    tried = {z: at(z) for z in np.arange(-np.pi, np.pi, ZERO_STEP)}
     near = max(tried, key=lambda z: float(np.nansum(tried[z])))
     fine = {z: at(z) for z in near + np.linspace(-0.5, 0.5, 9) * ZERO_STEP}
     best = max(fine, key=lambda z: float(np.nansum(fine[z])))
+    if abs(best) <= LARGEST:
+        return
     name = recording.joint_names[j]
+    # The first joint's zero is how the base is mounted.
+    mounted = "" if judged[:j].any() else ", or how its base is mounted"
     yield 1.5, Doubt(
         "zero", (j,), f"the zero of q.{name} looks {best:+.2g} rad off: moved so far, the model explains the torque",
-        f"map it with --columns and [offset] \"q.{name}\" = {best:.3g}, or mend the joint's reference in the model", {},
+        f"map it with --columns and [offset] \"q.{name}\" = {best:.3g}, or mend the joint's reference in the model"
+        f"{mounted}", {},
     ), fine[best]  # fmt: skip
 
 
