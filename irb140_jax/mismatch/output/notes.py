@@ -132,7 +132,7 @@ def friction_notes(ex: Explanation, names: Sequence[str], judged: np.ndarray) ->
         alike = (*ex.hyper[:j], one_level, *ex.hyper[j + 1 :])
         gain = ex.space.log_evidence(ex.chosen, ex.hyper) - ex.space.log_evidence(ex.chosen, alike)
         levels = ex.extra[0].groups[j] == FRICTION_LEVELS
-        if judged[j] and levels.any() and gain > -np.log(settings.RARE):
+        if judged[j] and own[j][levels].any() and gain > -np.log(settings.RARE):
             units = ("N", "N s/m") if ex.lib.robot.is_slide[j] else ("N m", "N m s/rad")
             dry, fast = (own[j] * ex.extra[0].units[j])[levels].reshape(2, -1)
             said = ", ".join(
