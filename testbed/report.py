@@ -21,7 +21,8 @@ LOOKS = ("first", "second", "third", "", "fifth", "sixth", "seventh")  # labels 
 CONDITIONS = {"quiet": "noise and steps of the sensors / 10", "long": "recordings 10 times as long"}
 # Forms of cases of servos in closed loop: what is logged, or known of their gains.
 SERVOS = {"torque": "torque", "known": "commands; gains known", "wrong": "commands; gains about 10 % wrong",
-          "unknown": "commands; gains unknown"}  # fmt: skip
+          "unknown": "commands; gains unknown",
+          "laws": "commands; gains known, a law of the servo hidden"}  # fmt: skip
 LEVELS = (0.5, 0.9, 0.99)
 WAYS = ("named", "in the class", "not testable", "unexplained", "missed")
 PLACES = ("located", "named alike", "noted", "not said")
@@ -132,13 +133,17 @@ def in_closed_loop(forms: dict[str, Lines]) -> str:
     for form, every in forms.items():
         lines = [x for x in every if x["diagnosis"]]
         wrong = [len(scoring.false_names(x)) for x in lines]
+        holding = [covered(v, s, true, 0.9) for x in lines for *_, v, s, true in scoring.intervals(x)]
         rows.append((
             form, engines(every), f"{len(lines)} of {len(every)}", f"{np.mean(wrong):.2f}",
             counted([c["size"] > 0 for x in lines for c in scoring.stated_classes(x) if c["slug"]]),
             counted([not x["diagnosis"]["findings"] for x in lines if not x["truth"]["hidden"]]),
+            f"{100 * np.mean(holding):.0f} % of {len(holding)}",
+            f"{np.median([scoring.unseen_ratio(x) for x in lines]):.2g}",
         ))  # fmt: skip
     return markdown(("logged", "engine at commit", "cases diagnosed", "false names a case",
-                     "true effect in the stated class", "nothing named where nothing is hidden"), rows)  # fmt: skip
+                     "true effect in the stated class", "nothing named where nothing is hidden",
+                     "90 % intervals that hold", "error on unseen torque over refit's, median"), rows)  # fmt: skip
 
 
 def tally(lines: Lines, of: Callable[[dict[str, Any]], list[tuple[str, str]]], ways: tuple[str, ...]) -> Rows:
