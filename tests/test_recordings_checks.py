@@ -261,7 +261,7 @@ def test_torque_that_is_out_of_step_by_more_than_a_diagnosis_finds_is_stated(shi
     for recording, arm in [*((r, irb140()) for r in shipped), (sound, robot)]:
         (said,) = re.findall(r"most joints comes about (\d+) ms (\w+)", " ".join(read(later(recording, delay), arm,
                                                                                          tmp_path).notes))  # fmt: skip
-        assert float(said[0]) == pytest.approx(1000 * abs(delay), abs=10) and (said[1] == "after") == (delay > 0)
+        assert float(said[0]) == pytest.approx(1000 * abs(delay), abs=5) and (said[1] == "after") == (delay > 0)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.025])

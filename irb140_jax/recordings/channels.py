@@ -343,7 +343,8 @@ def lateness_of_all(recording: Recording, seen: Glance, model: Torques, judged: 
 
 
 def _step(recording: Recording, seen: Glance) -> float:
-    return float(recording.t[-1] - recording.t[0]) / len(seen.tau)
+    whole = float(recording.t[-1] - recording.t[0])
+    return (whole - 2.0 * min(ENDS, 0.1 * whole)) / (len(seen.tau) - 1)
 
 
 def _share_later(seen: Glance, model: Torques, j: int, k: int) -> float:
