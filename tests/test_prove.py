@@ -89,7 +89,7 @@ def test_a_findings_sentence_says_what_it_is_compared_with_on_unseen_data(alike)
     for finding in findings(robot(), alike):
         share, said = re.findall(r"adding it removes ([\d.]+) % of the squared error that (.*)", finding.certain)[0]
         assert float(share) == pytest.approx(100.0 * (finding.evidence.heldout_gain or 0.0), abs=0.5)
-        assert said.startswith("inertial parameters of any size and the other findings, fitted in its place, leave on")
+        assert said.startswith("inertial parameters of any size and the other findings leave on unseen data without it")
 
 
 def contradicted(ex: Explanation, index: int, recording: int) -> Explanation:

@@ -42,8 +42,7 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
     # Inertial parameters that may be anything take up most of some torques, so the share can be small.
     others = any(i != index and not ex.data.candidates[i].is_inertials for i in ex.chosen)
     said += f"; adding it removes {_percent(float(np.clip(gain, 0.0, 0.9999)))} of the squared error that inertial "
-    said += f"parameters of any size{' and the other findings' * others}, fitted in its place, leave on unseen data of "
-    said += "all joints, each in units of its noise"
+    said += f"parameters of any size{' and the other findings' * others} leave on unseen data without it"
     if len(c.joints) == 1 and (c.effect.place.is_friction or c.slug in LEVELS):
         said += _mean_by_direction(robot, ex, c.joints[0], columns, w, cov)
     return said + "."
