@@ -26,7 +26,7 @@ class Demo:
 irb140 demo                         into irb140-demo-0
 irb140 demo --seed 7 --out demo     another effect, joint and strength"""
 
-    seed: int = 0
+    seed: int = 1
     """Seed for the effect, its joint and strength, the wrong inertials, the motions and the noise."""
 
     out: Annotated[pathlib.Path | None, arg(metavar="DIR")] = None
