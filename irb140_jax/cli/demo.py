@@ -23,7 +23,7 @@ class Demo:
     """Hide an effect, diagnose blind, then reveal the truth."""
 
     EXAMPLES: ClassVar = """\
-irb140 demo                         into irb140-demo-0
+irb140 demo                         into irb140-demo-1
 irb140 demo --seed 7 --out demo     another effect, joint and strength"""
 
     seed: int = 1
