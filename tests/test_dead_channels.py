@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import diagnose
 from irb140_jax.recordings import Recording
-from irb140_jax.recordings.channels import with_lost_torque_marked
+from irb140_jax.recordings.lost_channels import with_lost_torque_marked
 from irb140_jax.robot import load_robot
 
 FRICTION = 0.3

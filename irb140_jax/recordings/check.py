@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.channels import with_lost_torque_marked
 from irb140_jax.recordings.glance import Glance
+from irb140_jax.recordings.lost_channels import with_lost_torque_marked
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.repair import longest_run
 from irb140_jax.robot import Robot

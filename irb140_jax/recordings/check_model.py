@@ -11,10 +11,11 @@ from scipy.optimize import linear_sum_assignment, nnls
 
 from irb140_jax.effects.delay import HALVES
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.channels import channel_doubts, lateness, lateness_of_all, ratio_to_model
+from irb140_jax.recordings.channels import channel_doubts
 from irb140_jax.recordings.check import MOVING
 from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.torque_shape import lateness, lateness_of_all, ratio_to_model
 from irb140_jax.recordings.torques import Torques, nominal_torques
 from irb140_jax.robot import Robot
 

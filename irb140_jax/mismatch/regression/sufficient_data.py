@@ -7,10 +7,10 @@ import numpy as np
 
 from irb140_jax.mismatch import settings
 from irb140_jax.recordings.band import choose_band
-from irb140_jax.recordings.channels import with_lost_torque_marked
 from irb140_jax.recordings.check import MOVING, checked_numbers
 from irb140_jax.recordings.condition import Commanded, Conditioned, conditioned
 from irb140_jax.recordings.drive import LAG_WIDTH
+from irb140_jax.recordings.lost_channels import with_lost_torque_marked
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.repeats import with_motions_numbered, without_copies

@@ -83,10 +83,10 @@ class Explanation:
         return tuple(c for c in self.chosen if c != index)
 
     def not_only_on(self, joints: np.ndarray) -> "Explanation":
-        """The explanation without effects that are on some joints alone, shape (n,)."""
-        out = (i for i, c in zip(self.chosen, self.members, strict=True) if joints[list(c.joints)].all())
-        gone = {i for i in out if not self.data.candidates[i].is_inertials}
-        return dataclasses.replace(self, chosen=tuple(i for i in self.chosen if i not in gone))
+        """The explanation without effects that are on some joints alone, shape (n,); what happens once stays."""
+        stays = lambda c: c.is_inertials or c.effect.shapes.during or not joints[list(c.joints)].all()  # noqa: E731
+        kept = (i for i, c in zip(self.chosen, self.members, strict=True) if stays(c))
+        return dataclasses.replace(self, chosen=tuple(kept))
 
     def log_posterior(self, chosen: Sequence[int], joints: Sequence[int] | None = None) -> float:
         """Log posterior of a set, sizes and levels fitted to it anew, at some joints or all.

@@ -241,7 +241,8 @@ def unproved(ex: Explanation) -> list[Site]:
 
     Evidence trusts that some law is true.  Where none of them knows what the model errs by, one may fit all the same,
     and motions that the fit did not see tell: by how many nats they are less probable with it, each joint's error as
-    large as it is there.  Blocks of one motion are no other motion: where there are no others, nothing is taken away.
+    large as it is there, and with what it says nothing of.  Blocks of one motion are no other motion: where there are
+    no others, nothing is taken away.
     """
     left_out, recording = folds(ex), recordings_of_blocks(ex)
     if all(np.isin(recording[~fold], recording[fold]).any() for fold in left_out):
@@ -251,6 +252,7 @@ def unproved(ex: Explanation) -> list[Site]:
     for i in filter(lambda i: _is_rare(ex, i), ex.chosen):
         without = _unseen_errors(ex, ex.others(i), left_out)
         against[i] = 0.5 * float(np.sum(rows * np.log((whole + 1e-300) / (without + 1e-300))))
+        against[i] += float(ex.space.lost([i], ex.hyper)[0])
     most, worst = np.log(settings.NAMED / (1.0 - settings.NAMED)), sorted(against, key=lambda i: -against[i])[:1]
     return [site_of(ex.data.candidates[i]) for i in worst if against[i] > most]
 

@@ -23,11 +23,14 @@ def torque_size(proof: HeldOut, torque: Sequence[np.ndarray]) -> np.ndarray:
 def made_worse(proof: HeldOut, torque: Sequence[np.ndarray], scatter: np.ndarray) -> np.ndarray:
     """Joints whose error on unseen data an explanation makes larger, to more than half of the torque, shape (n,).
 
+    Larger by more than the sensors leave: what no other recording can tell of is in both errors.
+
     The model is not of such a joint, or its columns are another's; evidence is then between laws that are all wrong.
     """
     left, size = proof.rmse(proof.corrected), torque_size(proof, torque)
-    large = left > np.maximum(settings.LARGE_ERROR * size, settings.ABOVE_NOISE * scatter)
-    return proof.judged & large & (left > without_effects(proof))
+    above = settings.ABOVE_NOISE * scatter
+    large = left > np.maximum(settings.LARGE_ERROR * size, above)
+    return proof.judged & large & (left > np.hypot(without_effects(proof), above))
 
 
 def without_effects(proof: HeldOut) -> np.ndarray:

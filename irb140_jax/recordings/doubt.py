@@ -1,0 +1,22 @@
+"""What may be wrong with whole channels, as a sentence and a remedy."""
+
+from typing import NamedTuple
+
+
+class Doubt(NamedTuple):
+    """Something wrong with whole channels.
+
+    Attributes:
+        kind: What: "reversed torque", "reversed position", "reversed axis", "exchanged torque", "exchanged positions",
+            "gravity", "zero", "late", "unit".
+        joints: Indices of the joints concerned.
+        said: A sentence that names the columns.
+        remedy: What would mend it.
+        scale: Factors, by column, that would; empty where none do.
+    """
+
+    kind: str
+    joints: tuple[int, ...]
+    said: str
+    remedy: str
+    scale: dict[str, float]
