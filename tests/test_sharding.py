@@ -80,7 +80,7 @@ def test_swarms_and_rollouts_are_the_same_on_one_and_on_four_devices():
     assert "six are six" in said_on(4, ON_FOUR_DEVICES)
 
 
-def test_the_study_s_tables_are_made_on_as_many_devices_as_are_asked_for():
+def test_the_study_s_meshes_hold_as_many_devices_as_are_asked_for():
     assert "this process has 2; give 1 to 2" in said_on(2, STUDY_ON_TWO_DEVICES)
 
 

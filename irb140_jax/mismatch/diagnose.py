@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -69,6 +69,24 @@ class DiagnoseConfig:
         return {"inertial_uncertainty": self.inertial_uncertainty, "effects": effects}
 
 
+class Corrected(NamedTuple):
+    """A corrected model and how it fares.
+
+    Attributes:
+        data: The recordings, those of commands with the torque of the drives that were found.
+        model: The model.
+        proof: Its errors on unseen data.
+        harmful: Joints of servos whose discrepancy is left out of both because it makes the error larger, shape (n,).
+        by_laws: The model's torque without any discrepancy along each recording, (T, n) [N m or N].
+    """
+
+    data: Comparison
+    model: CorrectedModel
+    proof: HeldOut
+    harmful: np.ndarray
+    by_laws: list[np.ndarray]
+
+
 def diagnose(
     robot: Robot,
     recordings: Sequence[Recording],
@@ -108,7 +126,7 @@ def _diagnosed(
     logged, left = [s.tau for s in ex.data.stretches], held_out(ex, refit)
     corrected = _corrected(data, ex, refit, left, config)
     # Without them others may make it worse, too.
-    while (fewer := ex.not_only_on(made_worse(corrected[2], logged, np.hypot(*sensors)))).chosen != ex.chosen:
+    while (fewer := ex.not_only_on(made_worse(corrected.proof, logged, np.hypot(*sensors)))).chosen != ex.chosen:
         ex, left = fewer, held_out(fewer, refit)
         corrected = _corrected(data, ex, refit, left, config)
     progress("looking for structure that no effect explains")
@@ -161,14 +179,8 @@ def _explained(
 
 def _corrected(
     data: Comparison, ex: Explanation, refit: Refit, proof: HeldOut, config: DiagnoseConfig
-) -> tuple[Comparison, CorrectedModel, HeldOut, np.ndarray, list[np.ndarray]]:
-    """The corrected model, with the discrepancy where that helps on unseen motions.
-
-    Returns:
-        The recordings, those of commands with the torque of the drives that were found; the model; its errors on unseen
-        data; joints of servos whose discrepancy is left out of both because it makes the error larger, shape (n,); and
-        the model's torque without any discrepancy along each recording, (T, n).
-    """
+) -> Corrected:
+    """The corrected model, with the discrepancy where that helps on unseen motions."""
     post, scale, own = ex.prediction()
     model = dataclasses.replace(
         fitted_model(ex, refit.posterior(), refit.loose, post, scale, data.band),
@@ -187,4 +199,4 @@ def _corrected(
         without = [data.band.apply(torque) for torque in by_laws]
         harmful = harmful_discrepancy(dataclasses.replace(model, discrepancy=discrepancy), data.smooth, without)
         discrepancy, proof = discrepancy.on(~harmful), proof.without_discrepancy(harmful)
-    return data, dataclasses.replace(model, discrepancy=discrepancy), proof, harmful, by_laws
+    return Corrected(data, dataclasses.replace(model, discrepancy=discrepancy), proof, harmful, by_laws)

@@ -7,7 +7,7 @@ tilted base, a payload.  So only what no physics could bring about is refused, a
 import dataclasses
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment, nnls
+from scipy.optimize import linear_sum_assignment
 
 from irb140_jax.effects.delay import HALVES
 from irb140_jax.errors import RecordingError
@@ -15,7 +15,7 @@ from irb140_jax.recordings.channels import channel_doubts
 from irb140_jax.recordings.check import MOVING
 from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.torque_shape import lateness, lateness_of_all, ratio_to_model
+from irb140_jax.recordings.torque_shape import lateness, lateness_of_all, ratio_to_model, share_of_power
 from irb140_jax.recordings.torques import Torques, nominal_torques
 from irb140_jax.robot import Robot
 
@@ -41,7 +41,7 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Rec
     _check_angles(recording, seen, robot, model, moving & hinge)
     # A joint that is carried along unpowered logs a little of anything, even drag of the wrong sign.
     driven = moving & (np.std(seen.tau, axis=0) > MIN_SHARE * np.std(model.total, axis=0))
-    late = {int(j): lateness(recording, seen, model, int(j)) for j in _reversed(seen, model, driven)}
+    late = {int(j): lateness(seen, model, int(j)) for j in _reversed(seen, model, driven)}
     on_time = moving & ~np.isin(np.arange(robot.n), [j for j, delay in late.items() if delay > 0.0])
     _check_order(recording, seen, model, on_time)
     _check_sign(recording, seen, model, driven & on_time)
@@ -49,7 +49,7 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Rec
         raise RecordingError(f"{recording.source}: {doubt.said}: {doubt.remedy}")
     said = [f"tau.{recording.joint_names[j]} comes about {1000 * delay:.0f} ms after what the model needs: a drive "
             "that lags, or channels out of step" for j, delay in late.items() if delay > 0.0]  # fmt: skip
-    if not said and abs(delay := lateness_of_all(recording, seen, model, moving)) > LONGEST_DELAY:
+    if not said and abs(delay := lateness_of_all(seen, model, moving)) > LONGEST_DELAY:
         when = "after" if delay > 0.0 else "before"
         said = [f"The torque of most joints comes about {abs(1000 * delay):.0f} ms {when} what the model needs: drives "
                 "that lag, or channels out of step. Shift the torque by as much in time: a diagnosis finds delays up "
@@ -66,7 +66,7 @@ def explained_shares(seen: Glance, model: Torques) -> np.ndarray:
     centred = lambda x: x - x.mean(axis=0)  # noqa: E731
     features = [np.stack([model.gravity[:, j], model.moving[:, j], *own_motion(seen, j)], axis=1) for j in range(n)]
     targets = centred(seen.tau)
-    return np.array([[_non_negative_share(centred(features[j]), targets[:, k]) for k in range(n)] for j in range(n)])
+    return np.array([[share_of_power(centred(features[j]), targets[:, k]) for k in range(n)] for j in range(n)])
 
 
 def motion_shares(seen: Glance, model: Torques) -> tuple[np.ndarray, np.ndarray]:
@@ -87,7 +87,7 @@ def motion_shares(seen: Glance, model: Torques) -> tuple[np.ndarray, np.ndarray]
     for j in range(n):
         if np.var(targets[:, j]) > 0.05 * np.var(seen.tau[:, j]):
             features = left(np.stack([model.moving[:, j], *own_motion(seen, j)], axis=1))
-            shares[:, j] = [_non_negative_share(features, sign * targets[:, j]) for sign in (1, -1)]
+            shares[:, j] = [share_of_power(features, sign * targets[:, j]) for sign in (1, -1)]
     return shares[0], shares[1]
 
 
@@ -95,17 +95,6 @@ def own_motion(seen: Glance, j: int) -> tuple[np.ndarray, ...]:
     """Viscous friction, dry friction and rotor inertia of joint j, to scale."""
     slow = 0.02 * np.abs(seen.qd[:, j]).max() + 1e-12
     return seen.qd[:, j], np.tanh(seen.qd[:, j] / slow), seen.qdd[:, j]
-
-
-def _non_negative_share(features: np.ndarray, target: np.ndarray) -> float:
-    """Share of the target's power that a combination with no negative amplitude explains."""
-    power = target @ target
-    if power <= 0.0:
-        return 0.0
-    # Solved in the few dimensions that the features span, not in all samples.
-    Q, R = np.linalg.qr(features / np.maximum(np.linalg.norm(features, axis=0), 1e-300))
-    inside = Q.T @ target
-    return float((inside @ inside - nnls(R, inside)[1] ** 2) / power)
 
 
 def _check_angles(recording: Recording, seen: Glance, robot: Robot, model: Torques, hinges: np.ndarray) -> None:

@@ -22,6 +22,7 @@ class Glance(NamedTuple):
         logged_qd: Smoothed logged velocity, shape (SAMPLES, n), or None.
         logged_qdd: Smoothed logged acceleration, shape (SAMPLES, n), or None.
         travel: What each joint moves between extremes, shape (n,).
+        t: The instants [s], shape (SAMPLES,).
     """
 
     q: Float[np.ndarray, "S n"]
@@ -31,6 +32,7 @@ class Glance(NamedTuple):
     logged_qd: Float[np.ndarray, "S n"] | None
     logged_qdd: Float[np.ndarray, "S n"] | None
     travel: Float[np.ndarray, " n"]
+    t: Float[np.ndarray, " S"]
 
 
 def glance(recording: Recording) -> Glance:
@@ -55,5 +57,5 @@ def glance(recording: Recording) -> Glance:
     return Glance(
         thin(q), thin(qd), thin(qdd), thin(smooth(recording.tau) if recording.has_torque else np.full_like(q, np.nan)),
         None if recording.qd is None else thin(smooth(recording.qd)),
-        None if recording.qdd is None else thin(smooth(recording.qdd)), np.ptp(q, axis=0),
+        None if recording.qdd is None else thin(smooth(recording.qdd)), np.ptp(q, axis=0), thin(grid),
     )

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from irb140_jax.recordings.glance import ENDS, SAMPLES, glance
+from irb140_jax.recordings.glance import ENDS, Glance, glance
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.repair import longest_run
 from irb140_jax.recordings.smooth import white_noise
@@ -73,7 +73,7 @@ def _dead_positions(
     seen = glance(recording)
     model = nominal_torques(robot, seen.q, seen.qd, seen.qdd)
     for j, rows in still.items():
-        inside = _at_glance(recording, rows)
+        inside = _at(seen, recording, rows)
         here, needs = seen._replace(q=seen.q[inside], qd=seen.qd[inside], tau=seen.tau[inside]), model.total[inside, j]
         told = explained(here, Torques(model.gravity[inside], model.moving[inside]), np.ones(robot.n, dtype=bool))
         change, noise = np.std(here.tau[:, j]), white_noise(recording.t, recording.tau[:, j])
@@ -100,11 +100,9 @@ def _dead_positions(
             f"is not judged{left}. Log its position, or map the column that holds it")
 
 
-def _at_glance(recording: Recording, rows: np.ndarray) -> np.ndarray:
-    """Which samples of a glance lie in these rows."""
-    t = recording.t
-    margin = min(ENDS, 0.1 * (t[-1] - t[0]))
-    return np.interp(np.linspace(t[0] + margin, t[-1] - margin, SAMPLES), t, rows.astype(float)) > 0.5
+def _at(seen: Glance, recording: Recording, rows: np.ndarray) -> np.ndarray:
+    """Which samples of a quick look lie in these rows."""
+    return np.interp(seen.t, recording.t, rows.astype(float)) > 0.5
 
 
 def _switched_off(recording: Recording, rows: np.ndarray, j: int, robot: Robot) -> bool:
@@ -113,7 +111,7 @@ def _switched_off(recording: Recording, rows: np.ndarray, j: int, robot: Robot) 
         return False
     seen = glance(recording)
     needed = nominal_torques(robot, seen.q, seen.qd, seen.qdd).total[:, j]
-    inside = _at_glance(recording, rows)
+    inside = _at(seen, recording, rows)
     rms = lambda x: float(np.sqrt(np.mean(x**2))) if len(x) else 0.0  # noqa: E731
     return rms(needed[inside]) < OFF * rms(needed[~inside])
 

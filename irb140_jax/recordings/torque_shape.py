@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.optimize import nnls
 
-from irb140_jax.recordings.glance import ENDS, Glance
-from irb140_jax.recordings.recording import Recording
+from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.torques import Torques
 
 WELL, BADLY = 0.9, 0.6  # shares of a torque's variance that the model explains under a true hypothesis, and as given
@@ -30,10 +29,15 @@ def terms(qd: np.ndarray, model: np.ndarray) -> np.ndarray:
 
 def share_explained(features: np.ndarray, target: np.ndarray) -> float:
     """Share of the target's variance that a combination without negative amplitudes explains."""
-    features, target = features - features.mean(axis=0), target - target.mean()
+    return share_of_power(features - features.mean(axis=0), target - target.mean())
+
+
+def share_of_power(features: np.ndarray, target: np.ndarray) -> float:
+    """Share of the target's power that a combination without negative amplitudes explains."""
     power = target @ target
     if power <= 0.0:
         return 0.0
+    # Solved in the few dimensions that the features span, not in all samples.
     Q, R = np.linalg.qr(features / np.maximum(np.linalg.norm(features, axis=0), 1e-300))
     inside = Q.T @ target
     return float((inside @ inside - nnls(R, inside)[1] ** 2) / power)
@@ -54,29 +58,28 @@ def ratio_to_model(seen: Glance, model: Torques, j: int) -> float:
     return float(w[0] / size[0]) if clear else 0.0
 
 
-def lateness(recording: Recording, seen: Glance, model: Torques, j: int) -> float:
+def lateness(seen: Glance, model: Torques, j: int) -> float:
     """Time by which a joint's torque must be moved ahead for the model to explain it [s], 0 where that doesn't help.
 
     Args:
-        recording: The recording.
-        seen: A quick look at it.
+        seen: A quick look at a recording.
         model: Torque of the nominal model.
         j: The joint.
     """
-    step = _step(recording, seen)
+    step = _step(seen)
     # A slow wave turned round is nearly the wave half a period late.
     turned = share_explained(terms(seen.qd[:, j], model.total[:, j]), -seen.tau[:, j])
     best = 1.0 - min(1.0 - WELL, (1.0 - turned) / 2.0), 0
     return max(best, *((_share_later(seen, model, j, k), k) for k in range(1, int(LATEST / step) + 1)))[1] * step
 
 
-def lateness_of_all(recording: Recording, seen: Glance, model: Torques, judged: np.ndarray) -> float:
+def lateness_of_all(seen: Glance, model: Torques, judged: np.ndarray) -> float:
     """Time by which all torques must be moved ahead for the model to explain most of them [s], below 0 if moved back.
 
     Returns:
         0 where that isn't clear.
     """
-    step, joints = _step(recording, seen), np.flatnonzero(judged)
+    step, joints = _step(seen), np.flatnonzero(judged)
     shifts = np.arange(-int(LATEST / step), int(LATEST / step) + 1)
     left = 1.0 - np.array([[_share_later(seen, model, int(j), int(k)) for j in joints] for k in shifts])
     best = int(np.argmin(np.sum(np.log(left + 0.01), axis=1)))
@@ -84,9 +87,8 @@ def lateness_of_all(recording: Recording, seen: Glance, model: Torques, judged: 
     return float(shifts[best] * step) if 2 * clear.sum() > len(joints) else 0.0
 
 
-def _step(recording: Recording, seen: Glance) -> float:
-    whole = float(recording.t[-1] - recording.t[0])
-    return (whole - 2.0 * min(ENDS, 0.1 * whole)) / (len(seen.tau) - 1)
+def _step(seen: Glance) -> float:
+    return float(seen.t[-1] - seen.t[0]) / (len(seen.t) - 1)
 
 
 def _share_later(seen: Glance, model: Torques, j: int, k: int) -> float:
