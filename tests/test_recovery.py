@@ -186,6 +186,14 @@ def test_nothing_is_named_where_nothing_is_hidden(seed, joints, slides):
     assert any(robot.is_slide) == (slides > 0.0)
 
 
+def test_a_torque_constant_that_may_be_a_mass_is_no_model_that_is_right():
+    """Of a slide that pushes a mass along, nothing tells the two apart: but its error is 20 times the noise."""
+    robot, case = machine(12, 1, 1.0)
+    recordings = [dataclasses.replace(r, tau=1.1 * r.tau) for r in case.recordings]
+    diagnosis = diagnose(robot, recordings).diagnosis
+    assert (diagnosis.verdict, diagnosis.findings) == ("parameters_only", ())
+
+
 def test_a_filtered_log_is_one_delay_that_settles_in_few_rounds():
     robot, case = machine(1, JOINTS, 0.0)
     cut, said = 12.0, []

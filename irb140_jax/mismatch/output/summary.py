@@ -25,7 +25,8 @@ def verdict(
     `unexplained` where structure is left and nothing is named, or where the structure left on a joint is larger than
     what was named there.  `undecided` where a joint is open, unless a finding is on a joint that is not open, or
     removes more of an open joint's error than is left there: then the open joints are a note.  Also where nothing is
-    found and ordinary friction would not show on any joint (`blind`).
+    found and ordinary friction would not show on any joint (`blind`).  `parameters_only` also where inertials stand for
+    an error that may as well be the torque sensors': the model as given is off all the same.
     """
     nominal, corrected = proof.rmse(proof.nominal), proof.rmse(proof.corrected)
     named = np.sqrt(np.clip(nominal**2 - corrected**2, 0.0, None))
@@ -39,7 +40,8 @@ def verdict(
         return "undecided"
     if found:
         return "physics_left_out"
-    if _inertials_matter(ex):
+    off = nominal > settings.ABOVE_NOISE * proof.rmse(proof.refit)
+    if off.any() or _inertials_matter(ex):
         return "parameters_only"
     return "undecided" if blind else "no_mismatch"
 

@@ -115,12 +115,11 @@ def _smooth(r: Conditioned, carried: np.ndarray, j: int, position: np.ndarray, s
 
 def _reversal(r: Conditioned, carried: np.ndarray, scales: Scales, j: int, rounded: np.ndarray) -> np.ndarray:
     """What happens around one joint's reversals, shape (T, 35)."""
-    q, qd, qdd = r.q[:, j], r.qd[:, j], r.qdd[:, j]
+    q, qdd = r.q[:, j], r.qdd[:, j]
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
     base = [_relaxed(q, share * travel) - direction for share in settings.BRISTLE_TRAVELS]
-    rest = float(scales.rest_speed[j])
-    base += [np.tanh((qd + late * qdd) / rest) - direction for late in settings.TURNING_DELAYS]
+    base += [np.interp(r.t - late, r.t, direction) - direction for late in settings.TURNING_DELAYS]
     alone = np.stack(base, axis=1)
     X, even = np.concatenate([alone, rounded], axis=1), np.abs(carried)[:, None]
     pushed = np.abs(qdd)[:, None] / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
