@@ -8,7 +8,8 @@ effects and y; sums of those over joints are all that a search needs.
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 from scipy import linalg
@@ -19,7 +20,9 @@ from irb140_jax.mismatch.regression.nuisances import INSTRUMENT, SCALED
 
 ONE = 24  # index of the level at which the noise is as it was estimated
 LEVELS = tuple(1.25 ** (k - ONE) for k in range(2 * ONE))  # noise over what was estimated
-REMEMBERED = 192  # hyperparameters of a joint whose factors are kept
+REMEMBERED = 192  # hyperparameters of a joint whose factors are kept, and matrices of sets at those
+
+T = TypeVar("T")
 
 # Hyperparameters of a joint: indices into DISCREPANCY_SIZES for each block of SCALED, and into LEVELS.
 JointHyper = tuple[int, ...]
@@ -134,7 +137,8 @@ class JointGram:
         self._once = self._totals[0][1:] if self._totals else (np.zeros(blocks.shape[1:]), 0.0)
         self._log_prior = log_prior_of_sizes()
         self._by_level: dict[float, tuple[np.ndarray, float]] = {}
-        self._kept: dict[tuple[JointHyper, bool], Integrated] = {}
+        self._factors: dict[tuple, Integrated] = {}
+        self._of_sets: dict[tuple, np.ndarray] = {}
 
     def without(self, blocks: np.ndarray) -> "JointGram":
         """The same without some blocks, shape (B,)."""
@@ -168,36 +172,23 @@ class JointGram:
             instrument: Whether the instrument may err within its stated widths; otherwise it is taken to be right, but
                 for a servo's drive, which is part of the machine.
         """
-        key = hyper, instrument
-        if key not in self._kept:
-            if len(self._kept) >= REMEMBERED:
-                self._kept.pop(next(iter(self._kept)))
-            self._kept[key] = self._integrated(hyper, instrument)
-        else:
-            self._kept[key] = self._kept.pop(key)  # most recently used last
-        return self._kept[key]
+        return _kept(self._factors, (hyper, instrument), lambda: self._integrated(hyper, instrument))
 
-    def left(self, hypers: Sequence[JointHyper], columns: np.ndarray, scale: np.ndarray) -> np.ndarray:
-        """Gram matrices of the same shared columns at several hyperparameters, (b, k, k): see `Integrated.left`.
+    def left(self, hyper: JointHyper, columns: np.ndarray, instrument: bool = True) -> np.ndarray:
+        """Gram matrix of some shared columns, see `Integrated.left`; kept: sets that differ elsewhere have it, too.
 
         Args:
-            hypers: Sizes and levels, b of them.
+            hyper: Sizes and level.
             columns: Shared columns, shape (k,).
-            scale: Units in which they are wanted, shape (k,).
+            instrument: See `at`.
         """
-        out, squares = np.empty((len(hypers), len(columns), len(columns))), {}
-        for hyper, G in zip(hypers, out, strict=True):
-            at = self.at(hyper)
-            if hyper[-1] not in squares:  # most of them are at the same level
-                rows = columns + at.first
-                squares[hyper[-1]] = scale[:, None] * at.gram[rows[:, None], rows] * scale / at.level**2
-            half = scale[:, None] * at.half(columns)
-            np.subtract(squares[hyper[-1]], half @ half.T, out=G)
-        return out
+        return _kept(self._of_sets, (hyper, instrument, columns.tobytes()),
+                     lambda: self.at(hyper, instrument).left(columns, columns))  # fmt: skip
 
     def forget(self) -> None:
         """Drop what is kept: hundreds of megabytes, once a search is over."""
-        self._kept.clear()
+        self._factors.clear()
+        self._of_sets.clear()
         self._by_level.clear()
 
     def _integrated(self, hyper: JointHyper, instrument: bool) -> Integrated:
@@ -211,6 +202,15 @@ class JointGram:
         left = float(out.left(np.array([k - 1]), np.array([k - 1]))[0, 0])
         constant = -float(np.log(np.diag(chol)).sum()) - rows * np.log(level) - 0.5 * left
         return dataclasses.replace(out, constant=constant + float(self._log_prior[list(hyper[:-1])].sum()))
+
+
+def _kept(known: dict[tuple, T], key: tuple, made: Callable[[], T]) -> T:
+    """What is known under a key, or made; the least recently used of too many is dropped."""
+    value = known.pop(key) if key in known else made()
+    known[key] = value
+    if len(known) > REMEMBERED:
+        del known[next(iter(known))]
+    return value
 
 
 def _sum(blocks: np.ndarray, weights: np.ndarray) -> np.ndarray:

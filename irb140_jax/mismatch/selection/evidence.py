@@ -128,13 +128,14 @@ class Space:
         """
         H = np.zeros((len(rows), len(columns)))
         for j in range(len(self.joints)) if only is None else only:
-            at = self.places[j]
-            r = np.flatnonzero(at[rows] >= 0)
-            c = r if columns is rows else np.flatnonzero(at[columns] >= 0)
-            if len(r) and len(c):
-                across = at[rows[r]]
-                down = across if c is r else at[columns[c]]
-                H[r[:, None], c] += self.joints[j].at(hyper[j], instrument).left(across, down)
+            of_joint, down = self.joints[j], self.places[j][columns]
+            c = np.flatnonzero(down >= 0)
+            if columns is rows:
+                H[c[:, None], c] += of_joint.left(hyper[j], down[c], instrument)
+                continue
+            across = self.places[j][rows]
+            r = np.flatnonzero(across >= 0)
+            H[r[:, None], c] += of_joint.at(hyper[j], instrument).left(across[r], down[c])
         if self.centre.any():
             # A prior mean is a row of its own beside the data: y is the mean there.
             means, y = np.zeros(self.size + 1), np.arange(self.size + 1) == self.size

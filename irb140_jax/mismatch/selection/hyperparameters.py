@@ -68,7 +68,7 @@ def _climbed(space: Space, chosen: Sequence[int], hyper: Hyper, j: int, prior: n
 
     def values(tries: list[JointHyper]) -> None:
         if new := [s for s in tries if s not in known]:
-            own = gram.left(new, take, scale)
+            own = scale[:, None] * np.stack([gram.left(s, take) for s in new]) * scale
             diagonal = cholesky_diagonals(rest + own)
             value = 0.5 * (own[:, -1, -1] - diagonal[:, -1] ** 2) - np.log(diagonal[:, :-1]).sum(axis=1)
             lost = [space.lost(here, (*hyper[:j], s, *hyper[j + 1 :])).sum() for s in new]

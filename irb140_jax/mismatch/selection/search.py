@@ -35,7 +35,7 @@ class Search:
         self._refitting = features * np.log(settings.DISCREPANCY_SIZES[-1] / settings.DISCREPANCY_SIZES[1])
         self.visited: dict[frozenset[int], tuple[float, Hyper]] = {}
         self._screened: dict[tuple[int, frozenset[int]], list[tuple[float, int]]] = {}
-        self._in_vain: set[tuple[tuple[int, ...], frozenset[int]]] = set()
+        self._in_vain: dict[tuple[tuple[int, ...], frozenset[int]], frozenset[int]] = {}
 
     def judged(self, chosen: Iterable[int], hyper: Hyper, joints: Iterable[int] | None = None) -> float:
         """Log posterior of a set, its hyperparameters fitted from some near ones."""
@@ -66,7 +66,7 @@ class Search:
                         now, moving = better, True
                         self.visited[now] = settled(self.space, tuple(sorted(now)), self.visited[now][1])
             # What was tried in vain beside other sets at other joints counts in the averages beside this one.
-            self._in_vain.clear()
+            self._in_vain = {drop: beside for drop, beside in self._in_vain.items() if beside == now}
             self._screened.clear()
             if now == before:
                 return tuple(sorted(now))
@@ -165,6 +165,7 @@ class Search:
         space = self.space
         for drop in [*((c,) for c in now), *self._pairs(now)]:
             rest, joints = now - set(drop), self._joints(*drop)
+            shared = set[int].intersection(*(self._joints(m) for m in drop))
             beside = drop, frozenset(m for m in now if self._joints(m) & joints)
             if beside in self._in_vain:
                 continue
@@ -176,7 +177,7 @@ class Search:
             others += [(rest | set(p), joints) for p in itertools.combinations(special, 2) if self._together(*p)]
             # What acts on the whole arm takes the place of its like here; of a law on each joint in `_on_all_joints`.
             whole = [len(space.joints)] if len(joints) == len(space.joints) else []
-            for j in (*sorted(joints), *whole):
+            for j in (*sorted(shared), *whole):
                 for i in self.screened(rest, j, least=self._value(now)):
                     one = rest | {i}
                     others.append((one, joints | self._joints(i)))
@@ -189,17 +190,19 @@ class Search:
                 others += [(rest | {i}, joints | self._joints(i)) for i in arm]
             if (better := self._best(now, others)) != now:
                 return better
-            self._in_vain.add(beside)
+            self._in_vain[beside] = now
         return now
 
     def _special(self, members: tuple[int, ...]) -> list[int]:
-        """Special cases of laws, and ordinary friction in the place of any friction."""
-        out = []
+        """Special cases of laws, the same laws with other terms, and ordinary friction in the place of any friction."""
+        out = set[int]()
         for law in map(self._of, members):
-            rubs, special = law.effect.place.is_friction, law.effect.law.contains
-            out += [i for i, c in enumerate(self.space.candidates) if c.joints == law.joints and i not in members
-                    and (c.slug in special or (rubs and c.effect.prior.ordinary))]  # fmt: skip
-        return sorted(set(out))
+            for i, c in enumerate(self.space.candidates):
+                if c.joints == law.joints and i not in members:
+                    usual = law.effect.place.is_friction and c.effect.prior.ordinary
+                    terms = c.slug == law.slug and c.variant != law.variant and np.array_equal(c.shape, law.shape)
+                    out |= {i} if usual or terms or c.slug in law.effect.law.contains else set()
+        return sorted(out)
 
     def _together(self, one: int, other: int) -> bool:
         """Whether two candidates can stand side by side."""
