@@ -39,13 +39,20 @@ def test_a_joint_is_told_of_by_enough_motion_and_a_small_residual(left, rows, sc
 
 
 @pytest.mark.parametrize(
-    ("refit", "left", "scatter", "worse"),
-    [(0.6, 0.7, 0.05, True), (0.6, 0.7, 0.7, False), (0.8, 0.7, 0.05, False), (0.1, 0.3, 0.001, False)],
+    ("refit", "left", "scatter", "measured", "worse"),
+    [
+        (0.6, 0.7, 0.05, True, True),
+        (0.6, 0.7, 0.7, True, False),
+        (0.8, 0.7, 0.05, True, False),
+        (0.1, 0.3, 0.001, True, True),
+        (0.1, 0.3, 0.001, False, False),  # of torque made of commands
+        (0.6, 0.7, 0.05, False, True),
+    ],
 )
-def test_an_explanation_that_makes_a_large_error_larger_explains_nothing(refit, left, scatter, worse):
+def test_an_explanation_that_makes_the_error_larger_explains_nothing(refit, left, scatter, measured, worse):
     torque = np.sqrt(2.0) * np.sin(np.linspace(0.0, 20.0 * np.pi, 2000, endpoint=False))[:, None]
     errors = dataclasses.replace(proof(left), nominal=[np.ones((2000, 1))], refit=[np.full((2000, 1), refit)])
-    assert made_worse(errors, [torque], np.array([scatter])) == worse
+    assert made_worse(errors, [torque], np.array([scatter]), measured) == worse
 
 
 def test_no_effect_is_named_on_a_joint_whose_error_it_makes_larger(monkeypatch):

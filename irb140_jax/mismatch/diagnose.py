@@ -126,7 +126,8 @@ def _diagnosed(
     logged, left = [s.tau for s in ex.data.stretches], held_out(ex, refit)
     corrected = _corrected(data, ex, refit, left, config)
     # Without them others may make it worse, too.
-    while (fewer := ex.not_only_on(made_worse(corrected.proof, logged, np.hypot(*sensors)))).chosen != ex.chosen:
+    harms = lambda proof: made_worse(proof, logged, np.hypot(*sensors), data.servo is None)  # noqa: E731
+    while (fewer := ex.not_only_on(harms(corrected.proof))).chosen != ex.chosen:
         ex, left = fewer, held_out(fewer, refit)
         corrected = _corrected(data, ex, refit, left, config)
     progress("looking for structure that no effect explains")

@@ -20,16 +20,15 @@ def torque_size(proof: HeldOut, torque: Sequence[np.ndarray]) -> np.ndarray:
     return out
 
 
-def made_worse(proof: HeldOut, torque: Sequence[np.ndarray], scatter: np.ndarray) -> np.ndarray:
-    """Joints whose error on unseen data an explanation makes larger, to more than half of the torque, shape (n,).
+def made_worse(proof: HeldOut, torque: Sequence[np.ndarray], scatter: np.ndarray, measured: bool) -> np.ndarray:
+    """Joints whose error on unseen data an explanation makes larger, shape (n,).
 
-    Larger by more than the sensors leave: what no other recording can tell of is in both errors.
-
-    The model is not of such a joint, or its columns are another's; evidence is then between laws that are all wrong.
+    Larger by more than the sensors leave: what no other recording can tell of is in both errors.  Evidence is then
+    between laws that are all wrong.  Torque that is made of commands is itself wrong where the drive is: there the
+    error must also be more than half of it.
     """
-    left, size = proof.rmse(proof.corrected), torque_size(proof, torque)
-    above = settings.ABOVE_NOISE * scatter
-    large = left > np.maximum(settings.LARGE_ERROR * size, above)
+    left, above = proof.rmse(proof.corrected), settings.ABOVE_NOISE * scatter
+    large = left > (above if measured else np.maximum(settings.LARGE_ERROR * torque_size(proof, torque), above))
     return proof.judged & large & (left > np.hypot(without_effects(proof), above))
 
 
