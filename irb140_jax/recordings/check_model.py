@@ -15,7 +15,7 @@ from irb140_jax.recordings.channels import channel_doubts
 from irb140_jax.recordings.check import MOVING
 from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.torque_shape import lateness, lateness_of_all, ratio_to_model, share_of_power
+from irb140_jax.recordings.torque_shape import friction, lateness, lateness_of_all, ratio_to_model, share_of_power
 from irb140_jax.recordings.torques import Torques, nominal_torques
 from irb140_jax.robot import Robot
 
@@ -93,8 +93,7 @@ def motion_shares(seen: Glance, model: Torques) -> tuple[np.ndarray, np.ndarray]
 
 def own_motion(seen: Glance, j: int) -> tuple[np.ndarray, ...]:
     """Viscous friction, dry friction and rotor inertia of joint j, to scale."""
-    slow = 0.02 * np.abs(seen.qd[:, j]).max() + 1e-12
-    return seen.qd[:, j], np.tanh(seen.qd[:, j] / slow), seen.qdd[:, j]
+    return *friction(seen.qd[:, j]), seen.qdd[:, j]
 
 
 def _check_angles(recording: Recording, seen: Glance, robot: Robot, model: Torques, hinges: np.ndarray) -> None:

@@ -23,8 +23,13 @@ def explained(seen: Glance, model: Torques, judged: np.ndarray, tau: np.ndarray 
 
 def terms(qd: np.ndarray, model: np.ndarray) -> np.ndarray:
     """The model's torque, viscous and dry friction of one joint, shape (T, 3)."""
+    return np.stack([model, *friction(qd)], axis=1)
+
+
+def friction(qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Viscous and dry friction of one joint, to scale, shape (T,) each."""
     slow = 0.02 * np.abs(qd).max() + 1e-12
-    return np.stack([model, qd, np.tanh(qd / slow)], axis=1)
+    return qd, np.tanh(qd / slow)
 
 
 def share_explained(features: np.ndarray, target: np.ndarray) -> float:
