@@ -123,6 +123,7 @@ def _diagnosed(
     ex = _explained(data, sensors, config, progress)
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
+    ex = ex if data.servo else dataclasses.replace(ex, rigid=refit.posterior)
     logged, left = [s.tau for s in ex.data.stretches], held_out(ex, refit)
     corrected = _corrected(data, ex, refit, left, config)
     # Without them others may make it worse, too.

@@ -1,7 +1,7 @@
 """A set of candidates beside the rigid body: what it is in the data, and how probable it and its members are."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy import special
@@ -44,6 +44,8 @@ class Explanation:
         scaled: Whether one scale of all logged torques is a finding.
         unproved: What the search found and unseen motions speak against: not named.
         delay: Of all commands beyond what was given, and lag of all torques, by which those of its rows were made [s].
+        rigid: The fit of the inertials alone, from all blocks of the data or all but some: it predicts where nothing is
+            named.  None in logs of commands, where drives err beside it.
     """
 
     lib: Library
@@ -61,6 +63,7 @@ class Explanation:
     scaled: bool = False
     unproved: tuple[Site, ...] = ()
     delay: tuple[float, float] = (0.0, 0.0)
+    rigid: Callable[[np.ndarray | None], Posterior] | None = None
 
     @property
     def members(self) -> list[Candidate]:
@@ -173,18 +176,23 @@ class Explanation:
     def prediction(self, without: np.ndarray | None = None) -> tuple[Posterior, float, list[np.ndarray]]:
         """What predicts: possible inertials and amplitudes, the torque scale less one, and each joint's own columns.
 
-        The latter are the discrepancy and, of a servo, what its drive is off by.
+        The latter are the discrepancy and, of a servo, what its drive is off by.  Where nothing is named and the
+        instrument accounts for an error, inertials fitted as precisely as the sensors are drawn away by it.
 
         Args:
             without: Which blocks of the data are left out, shape (blocks,).
         """
         space = self.space if without is None else self.by_block.without(without)
-        mean, cov = space.posterior(self.chosen, self.hyper, instrument=False, scaled=self.scaled)
-        mean = self.of_bodies(mean, cov, self.chosen, space.offset)
         columns = space.set_columns(self.chosen)
+        mean, keep = np.zeros(len(columns)), np.r_[0 : space.inertials, space.offset : len(columns)]
+        if self.rigid is None or self.scaled or not all(c.is_inertials for c in self.members):
+            mean, cov = space.posterior(self.chosen, self.hyper, instrument=False, scaled=self.scaled)
+            mean = self.of_bodies(mean, cov, self.chosen, space.offset)
+            post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
+        else:
+            post = self.rigid(without)
+            mean[keep] = post.mean
         own = [space.own(j, s, columns, mean, instrument=False) for j, s in enumerate(self.hyper)]
-        keep = np.r_[0 : space.inertials, space.offset : len(mean)]
-        post = Posterior(self.columns(), mean[keep], cov[np.ix_(keep, keep)])
         return post, settings.GAIN_COMMON * float(mean[space.inertials]), own
 
     def of_drives(self, own: list[np.ndarray]) -> np.ndarray:
