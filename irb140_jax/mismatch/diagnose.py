@@ -171,7 +171,7 @@ def _explained(
 ) -> Explanation:
     """What the model leaves out, with one scale of all torques where that is probable."""
     scatter, uncertainty = np.hypot(*sensors), config.inertial_uncertainty
-    later = lambda *times: data.later(*times).smooth  # noqa: E731
+    later = lambda times: data.later(times).smooth  # noqa: E731
     effects = _searched(config, data)
     ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved, later)
     ex = without_negligible(ex, data.servo)
@@ -194,8 +194,9 @@ def _corrected(
     discrepancy, harmful = discrepancy_carried(ex, own, proof.carried), np.zeros(data.robot.n, dtype=bool)
     if data.servo is not None:
         kd, late = ex.of_drives(own).T
-        data = data.later(ex.delay[0] + data.servo.own_delay_width * late, ex.delay[1], kd)
-        model = dataclasses.replace(model, drive=data.recordings[0].drive)
+        own = data.servo.own_delay_width * late
+        model = dataclasses.replace(model, drive=data.servo.drive.found(ex.times, own, kd))
+        data = data.later(ex.times, own, kd)
         by_laws = [torques_along(model, r).corrected for r in data.smooth]
     if data.servo is not None and discrepancy is not None:
         without = [data.band.apply(torque) for torque in by_laws]

@@ -21,6 +21,21 @@ SECTIONS = ("kp", "kd", "torque_limit", "command_delay")  # of the column map
 
 
 @dataclasses.dataclass(frozen=True)
+class Times:
+    """When drives act, as a fit found it.
+
+    Attributes:
+        delay: By how much commands are taken up later than was given [s].
+        lag: Of all torques behind what commands and positions say [s].
+        phases: By how much later those of each recording are taken up than those of all [s]; empty for none.
+    """
+
+    delay: float = 0.0
+    lag: float = 0.0
+    phases: tuple[float, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
 class Drive:
     """Position servos: torque = Kp (qdes(t - delay) - q) + Kd (qddes - qd), within +- limit, and `lag` later.
 
@@ -61,16 +76,16 @@ class Drive:
         kp, kd = self.kp_width <= GAIN_WIDTH, self.kd_width <= GAIN_WIDTH * np.abs(self.kd)
         return all(word in ("model", "map") for word in self.said) and bool(np.all(kp & kd))
 
-    def found(self, delay: float | np.ndarray, lag: float, kd: float | np.ndarray = 0.0) -> "Drive":
-        """The drive as a fit found it.
+    def found(self, times: Times, later: float | np.ndarray = 0.0, kd: float | np.ndarray = 0.0) -> "Drive":
+        """The drive as a fit found it, without the phase of any recording.
 
         Args:
-            delay: By how much commands are taken up later than stated [s], of all or by joint.
-            lag: Of all torques [s].
+            times: When it acts.
+            later: Beyond that, of all or by joint [s].
             kd: Real less stated Kd in standard deviations, of all or by joint.
         """
         damping = np.maximum(self.kd + kd * self.kd_width, 0.0)
-        return dataclasses.replace(self, delay=self.delay + delay, lag=lag, kd=damping)
+        return dataclasses.replace(self, delay=self.delay + times.delay + later, lag=times.lag, kd=damping)
 
     @staticmethod
     def from_json(data: dict[str, Any]) -> "Drive":

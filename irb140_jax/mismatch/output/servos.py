@@ -148,11 +148,11 @@ def gain_notes(ex: Explanation, servo: Commanded) -> list[str]:
     ]
 
 
-def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
-    """How late all servos apply their commands, where that is not stated, and a note for every one that differs.
+def command_notes(ex: Explanation, servo: Commanded, phase_widths: np.ndarray) -> list[str]:
+    """How late all servos apply their commands, where that is not stated, and notes where recordings or servos differ.
 
-    The odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
-    any rare effect.
+    Phases have these widths beforehand [s], shape (recordings,).  The odds are the ratio of prior and posterior density
+    where it is zero (Savage and Dickey) times the prior odds of any rare effect.
     """
     more, unsure = ex.command_delay(servo.drive)
     late, lag = float(np.min(servo.drive.delay)) + more, ex.torque_lag()
@@ -162,6 +162,14 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
         "lost can't be told from the fit: whether commands are held from row to row or taken up late, the drive's "
         "torque lags, or the clocks are out of step. State [command_delay] in the map if it is known."
     ]  # fmt: skip
+    phases, unsure_of = ex.phases(phase_widths)
+    apart = [log_odds_of_any(p, s, w) for p, s, w in zip(phases, unsure_of, phase_widths, strict=True) if s > 0.0]
+    if max(apart, default=-np.inf) + np.log(settings.RARE) > 0.0:
+        out.append(
+            "The clocks of the recordings start at different moments between two commands: those of one recording act "
+            f"{digits(1e3 * abs(min(phases)))} ms before the mean of all recordings, those of another "
+            f"{digits(1e3 * max(phases))} ms after it. The fit takes this into account."
+        )
     for j in range(ex.lib.robot.n):
         own, spread = _own_nuisance(ex, j, COMMAND_DELAY)
         odds = log_odds_of_any(own, spread, 1.0) + np.log(settings.RARE)

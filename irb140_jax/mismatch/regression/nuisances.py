@@ -16,6 +16,7 @@ from irb140_jax.robot import Robot
 
 # A joint's own columns with stated widths, in their order; those of a servo come after them.
 FIXED = ("gain", "delay", "rotor", "smoothing", "bias")
+COMMON = 3  # nuisance parameters that all joints share, beside those of servos
 # Groups of columns with stated widths: errors of the instrument, and those of a servo's drive, which models hold.
 INSTRUMENT, DRIVE = -1, -2
 # Blocks of a joint whose size is learned from the recordings.
@@ -27,7 +28,8 @@ class Nuisances:
     """Columns of one recording beside inertials and effects, low-passed rows as in `Stretch`, in prior units.
 
     Attributes:
-        common: Torque scale, delay and smoothing of all joints, shape (R, n, 3).
+        common: Torque scale, delay and smoothing of all joints, and of servos the times of commands: `COMMON` of them
+            and those of `common_columns`, shape (R, n, C).
         own: Of each joint, fixed widths first, then the blocks `SCALED`; shape (R, D_j) each.
         groups: Which block each own column belongs to: `INSTRUMENT`, `DRIVE` or an index into `SCALED`; (D_j,) each.
         units: What each own column's feature was multiplied by, shape (D_j,) each.
@@ -80,6 +82,8 @@ def nuisances(
     for r, (a, (load, total)) in enumerate(zip(along, torques, strict=True)):
         motion, dt = a.recording, float(np.mean(np.diff(a.recording.t)))
         rate = delayed(at, total, dt)
+        # What each recording has beside the mean of all; of one recording there is nothing beside it.
+        own = (np.arange(count) == r) - 1.0 / count if count > 1 else np.zeros(0)
         early = motion.servo.lag_width if motion.servo else settings.DELAY_COMMON
         # Of a servo's torque, which is made of commands and positions, each joint's commands have a time of their own.
         own_delay = 0.0 if motion.servo else settings.DELAY_JOINT
@@ -88,15 +92,13 @@ def nuisances(
         bias = settings.BIAS * scales.torque * (1.0 - np.abs(motion.direction))
         gain, bend, rotor, bias = (late(at, x, np.arange(n), dt) for x in (load, bend, rotor, bias))
         common = np.stack([settings.GAIN_COMMON * gain, early * rate, 2.0 * bend], axis=-1)
-        commons.append(band.apply(np.concatenate([common, common_columns(motion)], axis=-1)))
+        commons.append(band.apply(np.concatenate([common, common_columns(motion, own)], axis=-1)))
         joints = []
         for j in range(n):
             wide = np.hypot(settings.GAIN_JOINT, scale_width(motion, j))
             fixed = (wide * gain[:, j], own_delay * rate[:, j], rotor[:, j], bend[:, j], bias[:, j])
             fixed = np.concatenate([np.stack(fixed, axis=1), servo_columns(motion, j)], axis=1)
-            # Levels of dry and viscous friction about their mean, a law's; of one recording there is nothing beside it.
-            own = (np.arange(count) == r) - 1.0 / count if count > 1 else np.zeros(0)
-            fast = motion.qd[:, [j]] / scales.speed[j]
+            fast = motion.qd[:, [j]] / scales.speed[j]  # levels of dry and viscous friction about a law's
             slope = np.concatenate([motion.direction[:, [j]] * own, fast * own], axis=1)
             scaled = [late(at, x, np.full(x.shape[1], j), dt) for x in (*features(motion, load, scales, j), slope)]
             joints.append([band.apply(b) for b in (fixed, *scaled)])

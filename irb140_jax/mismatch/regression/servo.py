@@ -5,6 +5,9 @@ The torque of a log of commands is made, tau = Kp (qdes - q) - Kd qd, so it errs
     d tau / d Kd = -(qd - qddes)          one class with viscous friction
     d tau / d delay = -Kp d(qdes)/dt      one class with a lag of the drive, where the command is all that changes fast
 
+The delay has a part that all recordings share, one of each joint, and one of each recording: its phase, for the clock
+of a log starts anywhere between two rows.
+
 An error of Kp is a torque scale; its width joins that of `GAIN_JOINT`.
 """
 
@@ -25,12 +28,18 @@ def servo_columns(motion: Conditioned, j: int) -> np.ndarray:
     return np.stack([damping, late], axis=1)
 
 
-def common_columns(motion: Conditioned) -> np.ndarray:
-    """A delay of all commands alike in prior units, shape (T, n, 1); (T, n, 0) where torque was logged."""
+def common_columns(motion: Conditioned, beside: np.ndarray) -> np.ndarray:
+    """Delays of all joints' commands alike in prior units, shape (T, n, P + 1); (T, n, 0) where torque was logged.
+
+    Args:
+        motion: Of one recording.
+        beside: How each recording's phase counts in this one, shape (P,); the delay of all comes last.
+    """
     servo = motion.servo
     if servo is None:
         return np.zeros((*motion.q.shape, 0))
-    return (servo.drive.common_delay_width * np.nan_to_num(servo.drive.kp) * servo.command_rate)[..., None]
+    late = (np.nan_to_num(servo.drive.kp) * servo.command_rate)[..., None]
+    return late * np.append(servo.phase_width * beside, servo.drive.common_delay_width)
 
 
 def scale_width(motion: Conditioned, j: int) -> float:

@@ -9,7 +9,7 @@ from irb140_jax.mismatch import settings
 from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.check import MOVING, checked_numbers
 from irb140_jax.recordings.condition import Commanded, Conditioned, conditioned
-from irb140_jax.recordings.drive import LAG_WIDTH
+from irb140_jax.recordings.drive import LAG_WIDTH, Times
 from irb140_jax.recordings.lost_channels import with_lost_torque_marked
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.recording import Recording
@@ -51,15 +51,22 @@ class Comparison:
         return self.smooth[0].servo
 
     @property
+    def phase_widths(self) -> np.ndarray:
+        """Standard deviation of each recording's phase, see `Commanded` [s]: of logs of commands, else empty."""
+        return np.array([r.servo.phase_width for r in self.smooth if r.servo is not None])
+
+    @property
     def rows(self) -> np.ndarray:
         """Low-passed rows in which each joint moves and nothing is lost, over all recordings, shape (n,)."""
         return usable_rows(self.smooth, self.band)
 
-    def later(self, delay: float | np.ndarray, lag: float, kd: float | np.ndarray = 0.0) -> "Comparison":
+    def later(self, times: Times, own: float | np.ndarray = 0.0, kd: float | np.ndarray = 0.0) -> "Comparison":
         """The same with the torque of drives as they were found, see `Drive.found`: logs of commands alone."""
-        recordings = [_later(r, delay, lag, kd) for r in self.recordings]
+        phases = times.phases or (0.0,) * len(self.recordings)
+        recordings = [_later(r, times, own + p, kd) for r, p in zip(self.recordings, phases, strict=True)]
         smooth, _ = with_motions_numbered(conditioned(recordings, self.band), recordings)
-        servos = [r.servo and dataclasses.replace(r.servo, lag_width=LAG_WIDTH if lag > 0.0 else 0.0) for r in smooth]
+        lag = LAG_WIDTH if times.lag > 0.0 else 0.0
+        servos = [r.servo and dataclasses.replace(r.servo, lag_width=lag) for r in smooth]
         smooth = [dataclasses.replace(r, servo=servo) for r, servo in zip(smooth, servos, strict=True)]
         return dataclasses.replace(self, recordings=recordings, smooth=smooth)
 
@@ -113,9 +120,9 @@ def comparable(
         recordings = [r for k, r in enumerate(recordings) if k not in short]
 
 
-def _later(recording: Recording, delay: float | np.ndarray, lag: float, kd: float | np.ndarray) -> Recording:
+def _later(recording: Recording, times: Times, own: float | np.ndarray, kd: float | np.ndarray) -> Recording:
     assert recording.drive is not None
-    drive = recording.drive.found(delay, lag, kd)
+    drive = recording.drive.found(times, own, kd)
     return dataclasses.replace(with_torque(recording, drive), torque_lost=recording.torque_lost)
 
 

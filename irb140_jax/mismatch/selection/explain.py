@@ -15,7 +15,7 @@ from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
 from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import Nuisances, nuisances
+from irb140_jax.mismatch.regression.nuisances import COMMON, Nuisances, nuisances
 from irb140_jax.mismatch.regression.proposals import left_over, suggested, with_proposals
 from irb140_jax.mismatch.regression.rows import (
     Stretch,
@@ -34,7 +34,7 @@ from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.recordings.condition import Conditioned
-from irb140_jax.recordings.drive import LAG_WIDTH, Drive
+from irb140_jax.recordings.drive import LAG_WIDTH, Drive, Times
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
 
@@ -51,7 +51,7 @@ def explain(
     sensors: np.ndarray,
     progress: Callable[[str], None] = lambda _: None,
     unproved: Callable[[Explanation], Sequence[Site]] = lambda _: (),
-    later: Callable[[float, float], Sequence[Conditioned]] | None = None,
+    later: Callable[[Times], Sequence[Conditioned]] | None = None,
 ) -> Explanation:
     """Search for what the model leaves out.
 
@@ -64,7 +64,7 @@ def explain(
         sensors: Standard deviation of what the sensors leave in the rows, shape (n,) [N m or N].
         progress: Told what is being done.
         unproved: Effects of an explanation that may not be named; the search goes on without them.
-        later: The recordings where commands are taken up so much later, and torque lags so much [s]: of servos alone.
+        later: The recordings with torque of drives that act at other times: of servos alone.
     """
     progress("rigid body along the recordings")
     along, factor = all_prepared(robot, recordings), inertial_prior_factor(robot, 1.0)
@@ -103,7 +103,7 @@ class _Given:
     uncertainty: float
     sensors: np.ndarray
     progress: Callable[[str], None]
-    later: Callable[[float, float], Sequence[Conditioned]] | None
+    later: Callable[[Times], Sequence[Conditioned]] | None
     drive: Drive | None
 
 
@@ -122,7 +122,7 @@ class _Start:
         noise: What the last explanation leaves.
         dropped: Effects that were named and then dropped when their shape was refined, each as often as that happened.
         unproved: Effects that may not be named.
-        delay: Of all commands beyond what was given, and lag of all torques [s].
+        times: When drives act.
     """
 
     round: int
@@ -135,7 +135,7 @@ class _Start:
     noise: Noise | None = None
     dropped: tuple[Site, ...] = ()
     unproved: tuple[Site, ...] = ()
-    delay: tuple[float, float] = (0.0, 0.0)
+    times: Times = Times()
 
     def without(self, sites: Sequence[Site]) -> "_Start":
         """The same round, in which some effects are not named."""
@@ -180,7 +180,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     first = of_kinds(given.first, lib.effects)
     space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
     silent = silent_rows(data.candidates, [r.recording for r in start.along], joints, noise)
-    space = dataclasses.replace(space, centre=_centre(space, given.drive, start.delay), silent=silent)
+    space = dataclasses.replace(space, centre=_centre(space, given.drive, start), silent=silent)
     sites = [site_of(c) for c in data.candidates]
     barred = [start.dropped.count(site) >= OFTEN or site in start.unproved for site in sites]
     without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
@@ -200,7 +200,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     data = dataclasses.replace(data, stretches=held)
     ex = Explanation(
         lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
-        unproved=start.unproved, delay=start.delay,
+        unproved=start.unproved, times=start.times,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
 
@@ -218,10 +218,11 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     robot, found = ex.lib.robot, fitted(ex.data, ex.posterior(), ex.chosen, given.factor)
     physics = _physics(found)
     better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
-    delay, known = start.delay, start.along
+    times, known = start.times, start.along
     if given.later is not None and given.drive is not None:
-        delay = ex.command_delay(given.drive)[0], ex.torque_lag()
-        known = [dataclasses.replace(a, recording=r) for a, r in zip(known, given.later(*delay), strict=True)]
+        phases, _ = ex.phases(_phase_widths(known))
+        times = Times(ex.command_delay(given.drive)[0], ex.torque_lag(), tuple(phases.tolist()))
+        known = [dataclasses.replace(a, recording=r) for a, r in zip(known, given.later(times), strict=True)]
     along = [seen_by(better, r) for r in known]
     torques = [torques_of(robot, physics, r, found[0], found[0], i) for i, r in enumerate(along)]
     noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
@@ -235,16 +236,24 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     refined = {site_of(every[i]) for i in start.chosen if not start.whole and every[i].effect.shapes.finer}
     lost = refined - _sites(ex.data, ex.chosen)
     dropped = (*start.dropped, *lost)
-    return _Start(turn, lib, along, loads, whole, at, chosen, noise, dropped, start.unproved, delay)
+    return _Start(turn, lib, along, loads, whole, at, chosen, noise, dropped, start.unproved, times)
 
 
-def _centre(space: Space, drive: Drive | None, delay: tuple[float, float]) -> np.ndarray:
+def _centre(space: Space, drive: Drive | None, start: _Start) -> np.ndarray:
     """Prior means of the common nuisances, see `Space`: rows are made with the times that were found so far."""
     out = np.zeros(space.offset - space.inertials)
-    if drive is not None:
-        widths = np.array([drive.common_delay_width, LAG_WIDTH])
-        out[[-1, 1]] = -np.divide(delay, widths, out=np.zeros(2), where=widths > 0.0)
+    if drive is not None and start.round > 1:
+        count, times = len(out) - COMMON - 1, start.times
+        found = np.array([0.0, times.lag, 0.0, *times.phases[:count], times.delay])
+        widths = np.array([0.0, LAG_WIDTH, 0.0, *_phase_widths(start.along)[:count], drive.common_delay_width])
+        out = -np.divide(found, widths, out=out, where=widths > 0.0)
     return out
+
+
+def _phase_widths(along: Sequence[Prepared]) -> np.ndarray:
+    """Standard deviation of each recording's phase [s], shape (recordings,)."""
+    servos = [a.recording.servo for a in along]
+    return np.array([s.phase_width for s in servos if s is not None])
 
 
 def _first_noise(

@@ -14,13 +14,13 @@ from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gaussian import Posterior
 from irb140_jax.mismatch.regression.gram import LEVELS
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import DRIVE, Nuisances
+from irb140_jax.mismatch.regression.nuisances import COMMON, DRIVE, Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.falling_friction import Fall
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.screening import gains, near, reshaped
-from irb140_jax.recordings.drive import LAG_WIDTH, Drive
+from irb140_jax.recordings.drive import LAG_WIDTH, Drive, Times
 from irb140_jax.recordings.low_pass import Band
 
 
@@ -43,7 +43,7 @@ class Explanation:
         falls: Members that are named because friction certainly falls with speed, whatever its form.
         scaled: Whether one scale of all logged torques is a finding.
         unproved: What the search found and unseen motions speak against: not named.
-        delay: Of all commands beyond what was given, and lag of all torques, by which those of its rows were made [s].
+        times: When drives act, by which torques of its rows were made.
         rigid: The fit of the inertials alone, from all blocks of the data or all but some: it predicts where nothing is
             named.  None in logs of commands, where drives err beside it.
     """
@@ -62,7 +62,7 @@ class Explanation:
     falls: Mapping[int, Fall] = dataclasses.field(default_factory=dict)
     scaled: bool = False
     unproved: tuple[Site, ...] = ()
-    delay: tuple[float, float] = (0.0, 0.0)
+    times: Times = Times()
     rigid: Callable[[np.ndarray | None], Posterior] | None = None
 
     @property
@@ -162,11 +162,28 @@ class Explanation:
     def command_delay(self, stated: Drive) -> tuple[float, float]:
         """Delay of all commands beyond what was given, and its standard deviation [s]; none acts before it is given."""
         more, unsure = self._common(self.space.offset - 1, stated.common_delay_width)
-        return max(self.delay[0] + more, -float(np.min(stated.delay))), unsure
+        return max(self.times.delay + more, -float(np.min(stated.delay))), unsure
 
     def torque_lag(self) -> float:
         """Lag of all torques behind what commands and positions say [s]; none comes before."""
-        return max(self.delay[1] + self._common(self.space.inertials + 1, LAG_WIDTH)[0], 0.0)
+        return max(self.times.lag + self._common(self.space.inertials + 1, LAG_WIDTH)[0], 0.0)
+
+    def phases(self, widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """By how much later commands of each recording are taken up than those of all, and standard deviations [s].
+
+        Args:
+            widths: Standard deviations beforehand [s], shape (recordings,).
+
+        Returns:
+            Arrays of the same shape; zeros where there is one recording.
+        """
+        if len(widths) == 1:
+            return np.zeros(1), np.zeros(1)
+        mean, cov = self.space.posterior(self.chosen, self.hyper)
+        mine = slice(self.space.inertials + COMMON, self.space.offset - 1)
+        beside = widths[:, None] * (np.eye(len(widths)) - 1.0 / len(widths))
+        made = np.array(self.times.phases) if self.times.phases else 0.0
+        return made + beside @ mean[mine], np.sqrt(np.diag(beside @ cov[mine, mine] @ beside.T))
 
     def _common(self, at: int, width: float) -> tuple[float, float]:
         """A time that all joints share, from that with which the rows were made, and its standard deviation [s]."""
