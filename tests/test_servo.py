@@ -122,21 +122,22 @@ def test_a_late_command_and_a_torque_that_lags_are_told_apart_and_no_physics(rob
     assert stated or any("can't be told from the fit" in note for note in result.diagnosis.notes)
 
 
-def test_recordings_whose_clocks_start_at_other_moments_have_the_same_friction(robot):
+def test_recordings_that_begin_at_other_moments_of_a_cycle_have_the_same_friction(robot):
     """A log's rows and a controller's cycles keep no common time: commands of one run act later than another's."""
     friction = 'frictionloss=".4" damping=".13"', 'frictionloss=".2" damping=".02"'
-    plant, delays = two_links(shoulder=friction[0], elbow=friction[1]), (0.004, 0.006)
+    plant, delays = two_links(shoulder=friction[0], elbow=friction[1]), (0.004, 0.005)
     loops = [closed_loop(plant, seed, delay=delay)[0] for seed, delay in zip((1, 2), delays, strict=True)]
     config = DiagnoseConfig(effects=tuple(CATALOGUE[slug] for slug in LIBRARY))
     result = diagnose(robot, [dataclasses.replace(r, drive=STATED) for r in loops], config)
     assert {name for name, *_ in names(result)} <= {"coulomb_friction", "viscous_friction"}
     np.testing.assert_allclose(drive_of(result.model).delay, np.mean(delays), atol=1e-3)
     notes = result.diagnosis.notes
-    (clocks,) = (n for n in notes if n.startswith("The clocks of the recordings"))
+    (clocks,) = (n for n in notes if n.startswith("The recordings begin at different moments"))
     before, after = map(float, re.findall(r"([0-9.]+) ms", clocks))
-    assert before == pytest.approx(1.0, abs=0.1) and after == pytest.approx(1.0, abs=0.1)
-    # Taken for friction, a millisecond would be some newton metre of it at this gain, of another sign in each run.
-    assert not any("differs between the recordings" in n for n in notes)
+    assert before == pytest.approx(0.5, abs=0.05) and after == pytest.approx(0.5, abs=0.05)
+    # Taken for friction, half a millisecond would be 0.03 and 0.015 N m s/rad of it, of another sign in each run.
+    said = [n for n in notes if "differs between the recordings" in n]
+    assert all(abs(float(x)) < 0.002 for n in said for x in re.findall(r"and (\S+) N m s/rad viscous", n))
     for fit in result.diagnosis.fit.values():
         assert fit.rmse_corrected is not None and fit.rmse_refit is not None
         assert fit.rmse_corrected < 0.2 * fit.rmse_refit

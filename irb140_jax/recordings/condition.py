@@ -34,7 +34,7 @@ class Commanded:
         asked_speed: Commanded speeds [rad/s or m/s], shape (T, n).
         own_delay_width: Standard deviation of the time at which those of one joint are taken up beside all others' [s].
         phase_width: Standard deviation of the time at which those of one recording are taken up beside all others' [s]:
-            a log's clock starts anywhere between two rows.
+            a log begins at any moment of a controller's cycle.
         lag_width: Standard deviation of how much later the torque comes than this says, never earlier [s].
     """
 
@@ -176,10 +176,11 @@ def _commanded(
     rate = np.gradient(wanted, t, axis=0)
     speed = np.zeros_like(wanted) if recording.qddes is None else filtered(
         _at(t, recording.t, recording.qddes), anti_alias)  # fmt: skip
-    row = float(np.median(np.diff(recording.t)))
-    own, phase = max(OWN_DELAY_WIDTH, ROWS_WIDTH * row), row / np.sqrt(12.0)
-    on_grid = _at(grid, recording.t, command), _at(grid, t, rate), _at(grid, t, speed)
-    return Commanded(recording.drive, *on_grid, own, phase if recording.drive.common_delay_width else 0.0)
+    own = max(OWN_DELAY_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
+    phase = recording.drive.common_delay_width / np.sqrt(12.0)  # of a moment anywhere in a cycle
+    return Commanded(
+        recording.drive, _at(grid, recording.t, command), _at(grid, t, rate), _at(grid, t, speed), own, float(phase)
+    )
 
 
 def _lost_torque(recording: Recording, grid: np.ndarray, reach: int) -> np.ndarray:

@@ -166,8 +166,8 @@ def command_notes(ex: Explanation, servo: Commanded, phase_widths: np.ndarray) -
     apart = [log_odds_of_any(p, s, w) for p, s, w in zip(phases, unsure_of, phase_widths, strict=True) if s > 0.0]
     if max(apart, default=-np.inf) + np.log(settings.RARE) > 0.0:
         out.append(
-            "The clocks of the recordings start at different moments between two commands: those of one recording act "
-            f"{digits(1e3 * abs(min(phases)))} ms before the mean of all recordings, those of another "
+            "The recordings begin at different moments of the controller's cycle: commands of one recording act "
+            f"{digits(1e3 * abs(min(phases)))} ms before the mean of all recordings, of another "
             f"{digits(1e3 * max(phases))} ms after it. The fit takes this into account."
         )
     for j in range(ex.lib.robot.n):

@@ -5,8 +5,8 @@ The torque of a log of commands is made, tau = Kp (qdes - q) - Kd qd, so it errs
     d tau / d Kd = -(qd - qddes)          one class with viscous friction
     d tau / d delay = -Kp d(qdes)/dt      one class with a lag of the drive, where the command is all that changes fast
 
-The delay has a part that all recordings share, one of each joint, and one of each recording: its phase, for the clock
-of a log starts anywhere between two rows.
+The delay has a part that all recordings share, one of each joint, and one of each recording: its phase, for a log
+begins at any moment of a controller's cycle.
 
 An error of Kp is a torque scale; its width joins that of `GAIN_JOINT`.
 """
