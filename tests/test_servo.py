@@ -319,6 +319,11 @@ def test_viscous_friction_of_a_servo_is_said_to_be_known_only_with_kd(robot):
     assert abs(known - 2.8) < 0.05  # Kd 2 and 0.8: known better than either
 
 
+def test_a_kp_that_is_stated_too_large_beside_a_right_kd_makes_no_viscous_friction(robot):
+    result = diagnosed(robot, stated_drive(1.3 * np.array(KP), np.array(KD)), elbow='frictionloss="0.25"')
+    assert names(result) == {("coulomb_friction", "elbow")}
+
+
 @pytest.mark.parametrize("more", [0.15, -0.15])
 def test_damping_within_the_doubt_of_kd_has_no_name_and_is_in_the_corrected_model(robot, more):
     drive = dataclasses.replace(STATED, kd=STATED.kd - [min(more, 0.0), 0.0])  # a servo damps less than is stated

@@ -9,7 +9,7 @@ from irb140_jax.effects import Scales
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Prepared
 from irb140_jax.mismatch.regression.discrepancy import features
-from irb140_jax.mismatch.regression.servo import common_columns, scale_width, servo_columns
+from irb140_jax.mismatch.regression.servo import common_columns, damping_of_scale, scale_width, servo_columns
 from irb140_jax.mismatch.regression.tangent import Point, delayed, late
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.robot import Robot
@@ -91,6 +91,7 @@ def nuisances(
         rotor = settings.ROTOR_ERROR * np.asarray(robot.armature) * motion.qdd
         bias = settings.BIAS * scales.torque * (1.0 - np.abs(motion.direction))
         gain, bend, rotor, bias = (late(at, x, np.arange(n), dt) for x in (load, bend, rotor, bias))
+        gain = gain + damping_of_scale(motion)
         common = np.stack([settings.GAIN_COMMON * gain, early * rate, 2.0 * bend], axis=-1)
         commons.append(band.apply(np.concatenate([common, common_columns(motion, own)], axis=-1)))
         joints = []

@@ -8,7 +8,8 @@ The torque of a log of commands is made, tau = Kp (qdes - q) - Kd qd, so it errs
 The delay has a part that all recordings share, one of each joint, and one of each recording: its phase, for a log
 begins at any moment of a controller's cycle.
 
-An error of Kp is a torque scale; its width joins that of `GAIN_JOINT`.
+An error of Kp is a torque scale; its width joins that of `GAIN_JOINT`.  The scale is not that of the term with Kd: of a
+stated Kp that is 1 + g times the real one, while Kd is right, the made torque is (1 + g) tau + g Kd (qd - qddes).
 """
 
 import numpy as np
@@ -40,6 +41,14 @@ def common_columns(motion: Conditioned, beside: np.ndarray) -> np.ndarray:
         return np.zeros((*motion.q.shape, 0))
     late = (np.nan_to_num(servo.drive.kp) * servo.command_rate)[..., None]
     return late * np.append(servo.phase_width * beside, servo.drive.common_delay_width)
+
+
+def damping_of_scale(motion: Conditioned) -> np.ndarray:
+    """What a wrong Kp makes beside the torque's scale, per unit of the scale [N m or N], (T, n); 0 of logged torque."""
+    servo = motion.servo
+    if servo is None:
+        return np.zeros_like(motion.q)
+    return np.nan_to_num(servo.drive.kd) * (motion.qd - servo.asked_speed)
 
 
 def scale_width(motion: Conditioned, j: int) -> float:
