@@ -320,7 +320,7 @@ def test_viscous_friction_of_a_servo_is_said_to_be_known_only_with_kd(robot):
 
 
 def test_a_kp_that_is_stated_too_large_beside_a_right_kd_makes_no_viscous_friction(robot):
-    result = diagnosed(robot, stated_drive(1.3 * np.array(KP), np.array(KD)), elbow='frictionloss="0.25"')
+    result = diagnosed(robot, stated_drive(1.5 * np.array(KP), np.array(KD)), elbow='frictionloss="0.25"')
     assert names(result) == {("coulomb_friction", "elbow")}
 
 
