@@ -194,9 +194,9 @@ def _corrected(
     discrepancy, harmful = discrepancy_carried(ex, own, proof.carried), np.zeros(data.robot.n, dtype=bool)
     if data.servo is not None:
         kd, late = ex.of_drives(own).T
-        own = data.servo.own_delay_width * late
-        model = dataclasses.replace(model, drive=data.servo.drive.found(ex.times, own, kd))
-        data = data.later(ex.times, own, kd)
+        later = data.servo.own_delay_width * late
+        model = dataclasses.replace(model, drive=data.servo.drive.found(ex.times, later, kd))
+        data = data.later(ex.times, later, kd)
         by_laws = [torques_along(model, r).corrected for r in data.smooth]
     if data.servo is not None and discrepancy is not None:
         without = [data.band.apply(torque) for torque in by_laws]

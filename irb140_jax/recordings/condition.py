@@ -33,8 +33,6 @@ class Commanded:
         command_rate: Derivative of the commanded positions, anti-aliased as the torque [rad/s or m/s], shape (T, n).
         asked_speed: Commanded speeds [rad/s or m/s], shape (T, n).
         own_delay_width: Standard deviation of the time at which those of one joint are taken up beside all others' [s].
-        phase_width: Standard deviation of the time at which those of one recording are taken up beside all others' [s]:
-            a log begins at any moment of a controller's cycle.
         lag_width: Standard deviation of how much later the torque comes than this says, never earlier [s].
     """
 
@@ -43,7 +41,6 @@ class Commanded:
     command_rate: np.ndarray
     asked_speed: np.ndarray
     own_delay_width: float
-    phase_width: float
     lag_width: float = LAG_WIDTH
 
     @property
@@ -176,11 +173,8 @@ def _commanded(
     rate = np.gradient(wanted, t, axis=0)
     speed = np.zeros_like(wanted) if recording.qddes is None else filtered(
         _at(t, recording.t, recording.qddes), anti_alias)  # fmt: skip
-    own = max(OWN_DELAY_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
-    phase = recording.drive.common_delay_width / np.sqrt(12.0)  # of a moment anywhere in a cycle
-    return Commanded(
-        recording.drive, _at(grid, recording.t, command), _at(grid, t, rate), _at(grid, t, speed), own, float(phase)
-    )
+    width = max(OWN_DELAY_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
+    return Commanded(recording.drive, _at(grid, recording.t, command), _at(grid, t, rate), _at(grid, t, speed), width)
 
 
 def _lost_torque(recording: Recording, grid: np.ndarray, reach: int) -> np.ndarray:

@@ -27,7 +27,7 @@ class Times:
     Attributes:
         delay: By how much commands are taken up later than was given [s].
         lag: Of all torques behind what commands and positions say [s].
-        phases: By how much later those of each recording are taken up than those of all [s]; empty for none.
+        phases: By how much later those of each recording are taken up than those of all [s]; empty for one recording.
     """
 
     delay: float = 0.0
@@ -75,6 +75,14 @@ class Drive:
         """Whether the law of every servo is: gains that are stated, and no worse than stated gains are."""
         kp, kd = self.kp_width <= GAIN_WIDTH, self.kd_width <= GAIN_WIDTH * np.abs(self.kd)
         return all(word in ("model", "map") for word in self.said) and bool(np.all(kp & kd))
+
+    @property
+    def phase_width(self) -> float:
+        """Standard deviation of the time at which one recording's commands are taken up beside all others' [s].
+
+        A log begins at any moment of a controller's cycle, whose length is that by which the delay of all is uncertain.
+        """
+        return float(self.common_delay_width / np.sqrt(12.0))
 
     def found(self, times: Times, later: float | np.ndarray = 0.0, kd: float | np.ndarray = 0.0) -> "Drive":
         """The drive as a fit found it, without the phase of any recording.

@@ -166,7 +166,7 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     gap = None if of.beyond is None else native_gap(of.beyond, of.data.band)
     lacking = list(dict.fromkeys(n.effect.title for n in of.model.named if n.effect.export.not_in_mjcf))
     channels = timing_notes(of.ex) if of.servo is None else [
-        *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo, of.data.phase_widths)]
+        *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo)]
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
     return [
         *of.data.servo_notes, *harmful_notes(robot, of.harmful), *open_joints,

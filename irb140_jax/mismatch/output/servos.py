@@ -148,11 +148,11 @@ def gain_notes(ex: Explanation, servo: Commanded) -> list[str]:
     ]
 
 
-def command_notes(ex: Explanation, servo: Commanded, phase_widths: np.ndarray) -> list[str]:
+def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     """How late all servos apply their commands, where that is not stated, and notes where recordings or servos differ.
 
-    Phases have these widths beforehand [s], shape (recordings,).  The odds are the ratio of prior and posterior density
-    where it is zero (Savage and Dickey) times the prior odds of any rare effect.
+    The odds are the ratio of prior and posterior density where it is zero (Savage and Dickey) times the prior odds of
+    any rare effect.
     """
     more, unsure = ex.command_delay(servo.drive)
     late, lag = float(np.min(servo.drive.delay)) + more, ex.torque_lag()
@@ -162,8 +162,8 @@ def command_notes(ex: Explanation, servo: Commanded, phase_widths: np.ndarray) -
         "lost can't be told from the fit: whether commands are held from row to row or taken up late, the drive's "
         "torque lags, or the clocks are out of step. State [command_delay] in the map if it is known."
     ]  # fmt: skip
-    phases, unsure_of = ex.phases(phase_widths)
-    apart = [log_odds_of_any(p, s, w) for p, s, w in zip(phases, unsure_of, phase_widths, strict=True) if s > 0.0]
+    phases, spreads = ex.phases(servo.drive)
+    apart = [log_odds_of_any(p, s, servo.drive.phase_width) for p, s in zip(phases, spreads, strict=True) if s > 0.0]
     if max(apart, default=-np.inf) + np.log(settings.RARE) > 0.0:
         out.append(
             "The recordings begin at different moments of the controller's cycle: commands of one recording act "

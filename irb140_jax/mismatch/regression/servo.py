@@ -40,7 +40,7 @@ def common_columns(motion: Conditioned, beside: np.ndarray) -> np.ndarray:
     if servo is None:
         return np.zeros((*motion.q.shape, 0))
     late = (np.nan_to_num(servo.drive.kp) * servo.command_rate)[..., None]
-    return late * np.append(servo.phase_width * beside, servo.drive.common_delay_width)
+    return late * np.append(servo.drive.phase_width * beside, servo.drive.common_delay_width)
 
 
 def damping_of_scale(motion: Conditioned) -> np.ndarray:

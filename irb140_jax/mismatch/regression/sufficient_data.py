@@ -51,11 +51,6 @@ class Comparison:
         return self.smooth[0].servo
 
     @property
-    def phase_widths(self) -> np.ndarray:
-        """Standard deviation of each recording's phase, see `Commanded` [s]: of logs of commands, else empty."""
-        return np.array([r.servo.phase_width for r in self.smooth if r.servo is not None])
-
-    @property
     def rows(self) -> np.ndarray:
         """Low-passed rows in which each joint moves and nothing is lost, over all recordings, shape (n,)."""
         return usable_rows(self.smooth, self.band)

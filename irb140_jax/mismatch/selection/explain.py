@@ -15,7 +15,7 @@ from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
 from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import COMMON, Nuisances, nuisances
+from irb140_jax.mismatch.regression.nuisances import Nuisances, nuisances
 from irb140_jax.mismatch.regression.proposals import left_over, suggested, with_proposals
 from irb140_jax.mismatch.regression.rows import (
     Stretch,
@@ -220,7 +220,7 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     better = better_known(robot, np.asarray(robot.phi) + found[0].reshape(-1, 10), physics)
     times, known = start.times, start.along
     if given.later is not None and given.drive is not None:
-        phases, _ = ex.phases(_phase_widths(known))
+        phases, _ = ex.phases(given.drive)
         times = Times(ex.command_delay(given.drive)[0], ex.torque_lag(), tuple(phases.tolist()))
         known = [dataclasses.replace(a, recording=r) for a, r in zip(known, given.later(times), strict=True)]
     along = [seen_by(better, r) for r in known]
@@ -243,17 +243,11 @@ def _centre(space: Space, drive: Drive | None, start: _Start) -> np.ndarray:
     """Prior means of the common nuisances, see `Space`: rows are made with the times that were found so far."""
     out = np.zeros(space.offset - space.inertials)
     if drive is not None and start.round > 1:
-        count, times = len(out) - COMMON - 1, start.times
-        found = np.array([0.0, times.lag, 0.0, *times.phases[:count], times.delay])
-        widths = np.array([0.0, LAG_WIDTH, 0.0, *_phase_widths(start.along)[:count], drive.common_delay_width])
+        times, phase = start.times, np.full(len(start.times.phases), drive.phase_width)
+        found = np.array([0.0, times.lag, 0.0, *times.phases, times.delay])
+        widths = np.array([0.0, LAG_WIDTH, 0.0, *phase, drive.common_delay_width])
         out = -np.divide(found, widths, out=out, where=widths > 0.0)
     return out
-
-
-def _phase_widths(along: Sequence[Prepared]) -> np.ndarray:
-    """Standard deviation of each recording's phase [s], shape (recordings,)."""
-    servos = [a.recording.servo for a in along]
-    return np.array([s.phase_width for s in servos if s is not None])
 
 
 def _first_noise(

@@ -168,21 +168,16 @@ class Explanation:
         """Lag of all torques behind what commands and positions say [s]; none comes before."""
         return max(self.times.lag + self._common(self.space.inertials + 1, LAG_WIDTH)[0], 0.0)
 
-    def phases(self, widths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def phases(self, stated: Drive) -> tuple[np.ndarray, np.ndarray]:
         """By how much later commands of each recording are taken up than those of all, and standard deviations [s].
 
-        Args:
-            widths: Standard deviations beforehand [s], shape (recordings,).
-
-        Returns:
-            Arrays of the same shape; zeros where there is one recording.
+        Both of shape (recordings,), or empty where there is one recording.
         """
-        if len(widths) == 1:
-            return np.zeros(1), np.zeros(1)
         mean, cov = self.space.posterior(self.chosen, self.hyper)
         mine = slice(self.space.inertials + COMMON, self.space.offset - 1)
-        beside = widths[:, None] * (np.eye(len(widths)) - 1.0 / len(widths))
-        made = np.array(self.times.phases) if self.times.phases else 0.0
+        count = len(mean[mine])
+        made = np.array(self.times.phases or np.zeros(count))
+        beside = stated.phase_width * (np.eye(count) - 1.0 / max(count, 1))
         return made + beside @ mean[mine], np.sqrt(np.diag(beside @ cov[mine, mine] @ beside.T))
 
     def _common(self, at: int, width: float) -> tuple[float, float]:
