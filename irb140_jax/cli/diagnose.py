@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
-from irb140_jax.cli.options import Columns, Hold, Out
+from irb140_jax.cli.options import Columns, Hold, KnownPayload, Out
+from irb140_jax.cli.payloads import known_payloads
 from irb140_jax.cli.robots import held_positions, recorded_robot
 from irb140_jax.cli.shown import console, progress, tell_kept
 from irb140_jax.errors import InputError
@@ -39,6 +40,7 @@ irb140 diagnose fast.csv slow.csv --out d                        the ABB IRB 140
 irb140 diagnose log.parquet --robot arm.urdf --out d             your robot, as MJCF or URDF
 irb140 diagnose left.csv --robot two_arms.urdf --hold torso=0.2 --out d    one arm of two, with all other joints held
 irb140 diagnose log.csv --robot arm.xml --columns map.toml --out d     other names and units
+irb140 diagnose bare.csv loaded.csv --known-payload loaded.csv=2.5 --out d    what the tool carried is known
 irb140 diagnose log.csv --out d --json > diagnosis.json          for a program"""
 
     recordings: Annotated[Positional[tuple[pathlib.Path, ...]], arg(metavar="REC [REC ...]")]
@@ -59,6 +61,11 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
     hold: Hold = ()
     """A joint that did not move, and its position [rad or m]; may be given several times. Other joints without
     columns are assumed to be at the model's reference, mostly zero."""
+
+    known_payload: KnownPayload = ()
+    """A recording in which the tool carried a mass that the model does not hold, and that mass [kg], with where it sits
+    beside the tool [m] if not there: loaded.csv=2.5@0,0,0.05. It fixes the scale of all torques; may be given several
+    times."""
 
     fix_base: bool = False
     """Hold the base, where it floats in the model."""
@@ -92,12 +99,13 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
         from irb140_jax.recordings import drive_of_model, read_recording
         from irb140_jax.robot import irb140_path, movable_joints
 
-        hold = held_positions(self.hold)
+        hold, carried = held_positions(self.hold), known_payloads(self.known_payload, self.recordings)
         robot = recorded_robot(self.robot, self.recordings, self.columns, hold, self.fix_base)
         known = movable_joints(self.robot or irb140_path())
         drive = drive_of_model(self.robot or irb140_path(), robot.joint_names)
         recordings = [
-            read_recording(path, robot, self.columns, known_joints=known, drive=drive) for path in self.recordings
+            read_recording(path, robot, self.columns, known_joints=known, drive=drive, payload=carried.get(path))
+            for path in self.recordings
         ]
         return diagnosed(robot, recordings, self.inertial_uncertainty, self._words(), known)
 
@@ -115,7 +123,8 @@ irb140 diagnose log.csv --out d --json > diagnosis.json          for a program""
         files = {"--robot": self.robot, "--columns": self.columns}
         named = [word for option, path in files.items() if path for word in (option, str(path))]
         held = [word for joint in self.hold for word in ("--hold", joint)]
-        return (*named, *held, *(["--fix-base"] if self.fix_base else []), "--out", str(self.out))
+        carried = [word for payload in self.known_payload for word in ("--known-payload", payload)]
+        return (*named, *held, *carried, *(["--fix-base"] if self.fix_base else []), "--out", str(self.out))
 
 
 def diagnosed(

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
-from irb140_jax.cli.options import Columns, Folder, OutFile
+from irb140_jax.cli.options import Columns, Folder, KnownPayload, OutFile
+from irb140_jax.cli.payloads import known_payloads
 from irb140_jax.cli.shown import tell_kept
 from irb140_jax.errors import InputError
 
@@ -41,6 +42,9 @@ irb140 predict d new.csv --out torque.csv --measured      with the measured torq
     columns: Columns = None
     """TOML file that maps other column names and units."""
 
+    known_payload: KnownPayload = ()
+    """What the tool carries in the recording and the model does not hold [kg], see `irb140 diagnose`: new.csv=2.5."""
+
     measured: bool = False
     """Also write tau_measured.<joint> and the residual of each model, residual_<model>.<joint>, and a PlotJuggler
     layout beside the table."""
@@ -69,7 +73,7 @@ irb140 predict d new.csv --out torque.csv --measured      with the measured torq
         model = load_model(self.folder)
         recording = read_recording(
             self.recording, model.robot, self.columns, torque="optional", known_joints=model.known_joints,
-            drive=model.drive,
+            drive=model.drive, payload=known_payloads(self.known_payload, [self.recording]).get(self.recording),
         )  # fmt: skip
         if recording.is_servo_log and recording.drive is not None and model.drive is not None:
             recording = with_torque(recording, recording.drive)

@@ -25,7 +25,7 @@ from irb140_jax.mismatch.output.servos import harmful_discrepancy, without_negli
 from irb140_jax.mismatch.output.store import Result
 from irb140_jax.mismatch.output.views import Views
 from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
-from irb140_jax.mismatch.regression.sufficient_data import Comparison, comparison, too_little
+from irb140_jax.mismatch.regression.sufficient_data import Comparison, comparison, payloads_taken_off, too_little
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted, unproved
@@ -121,6 +121,7 @@ def _diagnosed(
         return _nothing_compared(data, config, reason)
     sensors = scatter_by_sensor(robot, data.recordings, data.smooth, data.band)
     ex = _explained(data, sensors, config, progress)
+    data = data.placed(ex.payloads)
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
     ex = ex if data.servo else dataclasses.replace(ex, rigid=refit.posterior)
@@ -135,14 +136,18 @@ def _diagnosed(
     rest, found = unexplained(ex, left), findings(robot, ex)
     stated = data.servo
     data, model, proof, harmful, by_laws = corrected
-    beyond = beyond_file(model, data.smooth, by_laws)
+    bare = data
+    if any(r.payload for r in data.smooth):  # the file that is written holds none
+        bare = payloads_taken_off(data)
+        by_laws = [torques_along(model, r).corrected for r in bare.smooth]
+    beyond = beyond_file(model, bare.smooth, by_laws)
     matters = reference(ex.lib, ex.scales, data.band.rate)
     seen = visibility(ex, matters)
     of = Found(data, config.inertial_uncertainty, sensors, ex, proof, found, rest, seen, model, harmful, beyond, stated)
     diagnosis = document(of, provenance(robot, data.recordings, config.options, config.words))
     open_ = undecided(ex, found, seen, matters, data.band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
-    motion = motion_unseen(data, ex, proof, refit.loose, beyond)
+    motion = motion_unseen(bare, ex, proof, refit.loose, beyond)
     return Result(diagnosis, model, report_views(of, diagnosis.notes, motion), open_)
 
 

@@ -38,6 +38,8 @@ DELAY_COMMON, DELAY_JOINT = 1e-3, 5e-4
 SMOOTHED = 2e-5
 # Of the stated armature: gear ratios are exact, rotors of data sheets are known to a tenth.  A judgement.
 ROTOR_ERROR = 0.10
+# [m] along each axis from where a known payload is said to sit: a body bolted to a flange by hand.  A judgement.
+PAYLOAD_PLACED = 0.03
 # Of a joint's torque: what differs by direction may go on through a reversal, or vanish there.
 BIAS = 0.10
 

@@ -6,6 +6,7 @@ from irb140_jax.recordings.drive import stated_drive as stated_drive
 from irb140_jax.recordings.inspection import Inspection as Inspection
 from irb140_jax.recordings.inspection import inspect_recording as inspect_recording
 from irb140_jax.recordings.joints import common_joints as common_joints
+from irb140_jax.recordings.payload import Payload as Payload
 from irb140_jax.recordings.read import read_recording as read_recording
 from irb140_jax.recordings.read import recorded_joints as recorded_joints
 from irb140_jax.recordings.recording import Recording as Recording

@@ -8,6 +8,7 @@ from scipy import ndimage
 from irb140_jax import dynamics
 from irb140_jax.recordings.condition import Conditioned, condition, even
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
+from irb140_jax.recordings.payload import carrying
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.smooth import noise_density, signal_limit
 from irb140_jax.robot import Robot
@@ -71,7 +72,8 @@ def _coherent_limit(recordings: list[Recording], smooth: list[Conditioned], robo
     passive = lambda r: (r.stiffness, r.damping, r.frictionloss)  # noqa: E731
     moving = eqx.tree_at(passive, robot, (jnp.zeros(robot.n),) * 3)
     for r, alive in zip(smooth, living, strict=True):
-        m = np.asarray(dynamics.inverse_dynamics_batch(moving, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
+        loaded = carrying(moving, r.payload)
+        m = np.asarray(dynamics.inverse_dynamics_batch(loaded, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
         friction = np.concatenate([r.direction, r.qd], axis=1)
         slow = filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), kernels(SLOW, band.rate)[0])
         for j in np.flatnonzero(alive):

@@ -13,6 +13,7 @@ from scipy import interpolate, ndimage
 from irb140_jax.recordings.direction import REST, direction_of
 from irb140_jax.recordings.drive import LAG_WIDTH, OWN_DELAY_WIDTH, ROWS_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
+from irb140_jax.recordings.payload import Payload
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.servo import taken_up
 from irb140_jax.recordings.smooth import white_density, without_noise
@@ -72,6 +73,7 @@ class Conditioned:
         shaken: Standard deviation of what encoder noise leaves in qdd in the band of the comparison [rad/s^2 or
             m/s^2], shape (n,).
         servo: What the servos were told, where their torque was not logged but made; else None.
+        payload: A body of known mass on the tool, which the model does not hold; else None.
     """
 
     source: str
@@ -92,6 +94,7 @@ class Conditioned:
     motion: int = -1
     repeats: int = 1
     servo: Commanded | None = None
+    payload: Payload | None = None
 
 
 def conditioned(recordings: Sequence[Recording], band: Band) -> list[Conditioned]:
@@ -159,7 +162,8 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     servo = _commanded(recording, t, anti_alias, grid) if has_torque else None
     if servo is not None:
         unsure = np.hypot(unsure, servo.inexact * np.abs(filtered(tau, band.low_pass())))
-    return Conditioned(*moving, rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken, servo=servo)
+    rest = (rest_speed, q_noise, direction, unsure, tuple(notes), began, shaken)
+    return Conditioned(*moving, *rest, servo=servo, payload=recording.payload)
 
 
 def _commanded(

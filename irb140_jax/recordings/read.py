@@ -18,6 +18,7 @@ from irb140_jax.recordings.commands import check_commands
 from irb140_jax.recordings.drive import Drive, drive_of_map
 from irb140_jax.recordings.formats.opened import checksum
 from irb140_jax.recordings.glance import glance
+from irb140_jax.recordings.payload import Payload, carrying
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.table import read_table
 from irb140_jax.recordings.times import seconds_of_text, seconds_since_start
@@ -28,7 +29,7 @@ from irb140_jax.robot import Robot
 def read_recording(
     path: str | pathlib.Path, robot: Robot, columns: str | pathlib.Path | None = None, *,
     torque: Literal["required", "optional"] = "required", known_joints: tuple[str, ...] | None = None,
-    drive: Drive | None = None,
+    drive: Drive | None = None, payload: Payload | None = None,
 ) -> Recording:
     """Read a recording of this robot, in any format of `recordings.table`, and check it.
 
@@ -41,6 +42,7 @@ def read_recording(
         known_joints: Every joint that the model has, in its order, where the robot is a part of it: the map may speak
             of the others, too.
         drive: What the model says of the drives, for logs of commands; the map's own words beat it.
+        payload: A body of known mass that the tool carried and the model does not hold.
 
     Returns:
         The recording.  Repairs that are safe are made and stated in its `notes`.
@@ -55,6 +57,7 @@ def read_recording(
         stated = ColumnMap() if columns is None else read_column_map(columns, robot.joint_names, known_joints)
         recording = dataclasses.replace(recording, drive=drive_of_map(stated, robot.joint_names, drive))
     recording = repair.without_glitches(repair.unwrapped(recording, robot.is_slide))
+    recording, robot = dataclasses.replace(recording, payload=payload), carrying(robot, payload)
     seen = glance(recording)
     recording = check_motion(recording, seen, robot)
     if recording.has_torque:

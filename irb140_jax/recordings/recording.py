@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 
 from irb140_jax.errors import RecordingError
 from irb140_jax.recordings.drive import Drive
+from irb140_jax.recordings.payload import Payload
 from irb140_jax.tables import table_html
 
 WRITABLE = (".csv", ".parquet", ".npz")
@@ -39,6 +40,7 @@ class Recording:
         qddes: Commanded velocities of such a log [rad/s or m/s], shape (T, n), or None.
         drive: What is stated of the drives of such a log, or None.
         path: The file it was read from, as it was named; empty where it comes from none.
+        payload: A body of known mass that the tool carried and the model does not hold, or None.
     """
 
     t: Float[np.ndarray, " T"]
@@ -57,6 +59,7 @@ class Recording:
     qddes: Float[np.ndarray, "T n"] | None = None
     drive: Drive | None = None
     path: str = ""
+    payload: Payload | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.t), len(self.joint_names))

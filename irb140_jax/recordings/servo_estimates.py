@@ -16,6 +16,7 @@ from scipy.optimize import nnls
 
 from irb140_jax.recordings.drive import GAIN_WIDTH, Drive
 from irb140_jax.recordings.glance import glance
+from irb140_jax.recordings.payload import carrying
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.torques import nominal_torques
 from irb140_jax.robot import Robot
@@ -72,7 +73,7 @@ def rows_of_joints(
     parts: list[list[Rows]] = [[] for _ in range(robot.n)]
     for r, d in zip(servos, drives, strict=True):
         seen = glance(r)
-        total = nominal_torques(robot, seen.q, seen.qd, seen.qdd).total
+        total = nominal_torques(carrying(robot, r.payload), seen.q, seen.qd, seen.qdd).total
         smooth = lambda x, r=r, d=d: glance(dataclasses.replace(r, tau=_later(r, d, x))).tau  # noqa: E731
         late, told = [smooth(x) - seen.q for x in delays], [smooth(x) for x in BEFORE]
         for j in range(robot.n):

@@ -18,6 +18,7 @@ from irb140_jax.effects import Asked, Motion, RigidBody, Scales
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.payload import carrying
 from irb140_jax.recordings.turning_points import turned_before, turning_points
 from irb140_jax.robot import Robot, about_origin
 from irb140_jax.types import JointSamples
@@ -70,7 +71,7 @@ class Prepared:
     """A conditioned recording with what the rigid body does along it.
 
     Attributes:
-        robot: The nominal model.
+        robot: The nominal model with the recording's known payload.
         seen: The robot whose slopes shape the effects; see `seen_by`.
         recording: T samples.
         nominal: Torque of the nominal model [N m or N], shape (T, n).
@@ -120,10 +121,10 @@ def prepared(robot: Robot, recording: Conditioned, *, seen: Robot | None = None,
         seen: The robot whose slopes shape the effects, if it is another; see `seen_by`.
         kept: Whether regressor and sensitivities are held for the next time that they are needed.
     """
+    robot, seen = carrying(robot, recording.payload), carrying(seen or robot, recording.payload)
     motor_side = np.asarray(robot.armature) * recording.qdd + _friction(robot, recording)
     spring = np.asarray(robot.stiffness) * (recording.q - np.asarray(robot.springref))
     phi, links, bodies, regressors = np.asarray(robot.phi).ravel(), [], [], []
-    seen = robot if seen is None else seen
     inertia = np.zeros(robot.n)
     for at in pieces(len(recording.t)):
         Y = _regressor(robot, recording, at)
@@ -147,9 +148,10 @@ def all_prepared(robot: Robot, recordings: Sequence[Conditioned], seen: Robot | 
 
 def seen_by(robot: Robot, along: Prepared) -> Prepared:
     """The same with the sensitivities of a robot that is known better."""
+    r = along.recording
+    robot = carrying(robot, r.payload)
     if along.rigid is None:
         return dataclasses.replace(along, seen=robot)
-    r = along.recording
     parts = [_sensitivities(robot, r, at, along.regressor_at(at)[..., -10:]) for at in pieces(len(r.t))]
     return dataclasses.replace(along, seen=robot, rigid=_joined(parts))
 

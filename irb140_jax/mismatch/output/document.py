@@ -82,7 +82,8 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     robot, scatter = of.data.robot, np.hypot(*of.sensors)
     logged = [s.tau for s in of.ex.data.stretches]
     missing = undecidable(robot, of.proof, logged, scatter, of.data.band)
-    found = of_servos(of.ex, of.servo, [*of.findings, *torque_scale_finding(robot, of.ex)])
+    weighed = any(r.payload for r in of.data.smooth)
+    found = of_servos(of.ex, of.servo, [*of.findings, *torque_scale_finding(robot, of.ex, weighed)])
     fit, shifts = fit_by_joint(robot, of.proof, scatter), link_shifts(robot, of.ex)
     effects = of.ex.lib.effects | ({TORQUE_GAIN.slug: TORQUE_GAIN} if of.ex.scaled else {})
     blind = shows_no_friction(of.seen, effects)

@@ -45,21 +45,29 @@ def torque_scale_odds(ex: Explanation) -> tuple[float, float]:
     return float(odds), float(special.expit(odds))
 
 
-def torque_scale_finding(robot: Robot, ex: Explanation) -> list[Finding]:
-    """The torque of all joints logged too large or too small by one factor, where that is probable."""
+def torque_scale_finding(robot: Robot, ex: Explanation, weighed: bool) -> list[Finding]:
+    """The torque of all joints logged too large or too small by one factor, where that is probable.
+
+    Args:
+        robot: The nominal model.
+        ex: The explanation.
+        weighed: Whether the tool carried a known payload in some recordings.
+    """
     odds, probability = torque_scale_odds(ex)
     if not ex.scaled:
         return []
     w, std = ex.torque_scale()
     gain, spread, way = 1.0 / (1.0 + w), std / (1.0 + w) ** 2, "large" if w > 0 else "small"
+    by_what = "by what the known payload adds to it" if weighed else (
+        "for the stated masses; only a known payload can tell wrong torque constants from masses that are all wrong by "
+        "one factor")
     return [Finding(
         "torque_gain", robot.joint_names,
         f"all joints: in proportion to the rigid-body torque; the real torque is {gain:.3g} times the logged one",
         {"gain": Estimate(gain, spread, "1")},
         # Without it refitted inertials explain the same torque, so it removes no error on unseen data.
         Evidence(odds, probability, 0.0),
-        f"The logged torque of all joints is {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} for the stated masses; "
-        "only a known payload can tell wrong torque constants from masses that are all wrong by one factor.",
+        f"The logged torque of all joints is {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} {by_what}.",
         (),
     )]  # fmt: skip
 

@@ -12,6 +12,7 @@ from irb140_jax.mismatch.regression.nuisances import FIXED, SCALED
 from irb140_jax.mismatch.regression.sufficient_data import Comparison, mostly_lost
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.recordings.payload import Payload
 from irb140_jax.robot import Robot
 
 FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
@@ -31,6 +32,12 @@ def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]
     robot, band = data.robot, data.band
     out = [f"Model {robot.name}: {_sentence(note)}" for note in robot.notes]
     out += [f"{r.source}: {_sentence(note)}" for r in data.smooth for note in r.notes]
+    out += [
+        f"{r.source}: the tool carries {r.payload.mass:g} kg that the model does not hold, {_place(r.payload)}, give or "
+        f"take {100 * settings.PAYLOAD_PLACED:g} cm along each axis (--known-payload); the fit moves it by "
+        f"{', '.join(f'{100 * x:.1f}' for x in r.payload.off)} cm."
+        for r in data.smooth if r.payload
+    ]  # fmt: skip
     for name, count, lost, enough in zip(robot.joint_names, data.rows, mostly_lost(data.smooth), judged, strict=True):
         if not enough:
             why = f"dead or frozen channels and gaps leave {count} usable rows of it" if lost else (
@@ -193,6 +200,10 @@ def _discrepancy_of_joint(ex: Explanation, j: int, own: np.ndarray) -> str:
     most = int(np.argmax(np.mean(blocks**2, axis=1)))
     size, unit = float(np.sqrt(np.mean(blocks.sum(axis=0) ** 2))), "N" if robot.is_slide[j] else "N m"
     return f"{robot.joint_names[j]} {digits(size)} {unit} RMS, most of it with {GOES_WITH[most]}"
+
+
+def _place(payload: Payload) -> str:
+    return f"at {', '.join(f'{x:g}' for x in payload.at)} m from it" if any(payload.at) else "with its centre at the tool"
 
 
 def _sentence(note: str) -> str:

@@ -11,7 +11,9 @@ from irb140_jax.mismatch.columns.along import Prepared
 from irb140_jax.mismatch.regression.discrepancy import features
 from irb140_jax.mismatch.regression.servo import common_columns, damping_of_scale, scale_width, servo_columns
 from irb140_jax.mismatch.regression.tangent import Point, delayed, late
+from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
+from irb140_jax.recordings.payload import Payload, inertials_per_metre
 from irb140_jax.robot import Robot
 
 # A joint's own columns with stated widths, in their order; those of a servo come after them.
@@ -28,8 +30,8 @@ class Nuisances:
     """Columns of one recording beside inertials and effects, low-passed rows as in `Stretch`, in prior units.
 
     Attributes:
-        common: Torque scale, delay and smoothing of all joints, and of servos the times of commands: `COMMON` of them
-            and those of `common_columns`, shape (R, n, C).
+        common: Torque scale, delay and smoothing of all joints, `COMMON` of them; where known payloads sit; and of
+            servos the times of commands: those of `common_columns`; shape (R, n, C).
         own: Of each joint, fixed widths first, then the blocks `SCALED`; shape (R, D_j) each.
         groups: Which block each own column belongs to: `INSTRUMENT`, `DRIVE` or an index into `SCALED`; (D_j,) each.
         units: What each own column's feature was multiplied by, shape (D_j,) each.
@@ -55,6 +57,28 @@ def feature_coefficients(extra: Nuisances, own: Sequence[np.ndarray], joints: np
     ])  # fmt: skip
 
 
+def payload_columns(robot: Robot, along: Sequence[Prepared]) -> list[np.ndarray]:
+    """Torque per standard deviation of where each known payload sits, along each recording, (T, n, 3 P) [N m or N].
+
+    Args:
+        robot: The nominal model.
+        along: The recordings.  Those with the same payload carried the same body.
+    """
+    carried, out = payloads([a.recording for a in along]), []
+    for a in along:
+        dphi = np.zeros((robot.n, 10, 3 * len(carried)))
+        for p in (p for p in carried if p == a.recording.payload):
+            at = 3 * carried.index(p)
+            dphi[-1, :, at : at + 3] = settings.PAYLOAD_PLACED * inertials_per_metre(robot, p)
+        out.append(a.torque_of(dphi.reshape(10 * robot.n, -1)))
+    return out
+
+
+def payloads(recordings: Sequence[Conditioned]) -> list[Payload]:
+    """What the tool carried in any of some recordings, once each."""
+    return [*dict.fromkeys(r.payload for r in recordings if r.payload)]
+
+
 def nuisances(
     robot: Robot,
     along: Sequence[Prepared],
@@ -78,7 +102,7 @@ def nuisances(
     """
     n, count = robot.n, len(along)
     raw: list[list[list[np.ndarray]]] = []  # recording, joint, block
-    commons = []
+    commons, placed = [], payload_columns(robot, along)
     for r, (a, (load, total)) in enumerate(zip(along, torques, strict=True)):
         motion, dt = a.recording, float(np.mean(np.diff(a.recording.t)))
         rate = delayed(at, total, dt)
@@ -91,9 +115,10 @@ def nuisances(
         rotor = settings.ROTOR_ERROR * np.asarray(robot.armature) * motion.qdd
         bias = settings.BIAS * scales.torque * (1.0 - np.abs(motion.direction))
         gain, bend, rotor, bias = (late(at, x, np.arange(n), dt) for x in (load, bend, rotor, bias))
+        held = [late(at, x, np.arange(n), dt)[..., None] for x in np.moveaxis(placed[r], -1, 0)]
         gain = gain + damping_of_scale(motion)
         common = np.stack([settings.GAIN_COMMON * gain, early * rate, 2.0 * bend], axis=-1)
-        commons.append(band.apply(np.concatenate([common, common_columns(motion, own)], axis=-1)))
+        commons.append(band.apply(np.concatenate([common, *held, common_columns(motion, own)], axis=-1)))
         joints = []
         for j in range(n):
             wide = np.hypot(settings.GAIN_JOINT, scale_width(motion, j))

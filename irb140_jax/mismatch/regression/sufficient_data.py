@@ -12,9 +12,11 @@ from irb140_jax.recordings.condition import Commanded, Conditioned, conditioned
 from irb140_jax.recordings.drive import LAG_WIDTH, Times
 from irb140_jax.recordings.lost_channels import with_lost_torque_marked
 from irb140_jax.recordings.low_pass import Band
+from irb140_jax.recordings.payload import Payload, carrying
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.repeats import with_motions_numbered, without_copies
 from irb140_jax.recordings.servo import with_servo_torques, with_torque
+from irb140_jax.recordings.torques import nominal_torques
 from irb140_jax.robot import Robot
 
 MORE = "record at least 15 s in which every joint moves, with a dozen reversals"
@@ -55,6 +57,12 @@ class Comparison:
         """Low-passed rows in which each joint moves and nothing is lost, over all recordings, shape (n,)."""
         return usable_rows(self.smooth, self.band)
 
+    def placed(self, payloads: Sequence[Payload | None]) -> "Comparison":
+        """The same with what the tool carried in each recording where it was found to sit."""
+        recordings = [dataclasses.replace(r, payload=p) for r, p in zip(self.recordings, payloads, strict=True)]
+        smooth = [dataclasses.replace(r, payload=p) for r, p in zip(self.smooth, payloads, strict=True)]
+        return dataclasses.replace(self, recordings=recordings, smooth=smooth)
+
     def later(self, times: Times, own: float | np.ndarray = 0.0, kd: float | np.ndarray = 0.0) -> "Comparison":
         """The same with the torque of drives as they were found, see `Drive.found`: logs of commands alone."""
         phases = times.phases or (0.0,) * len(self.recordings)
@@ -64,6 +72,16 @@ class Comparison:
         servos = [r.servo and dataclasses.replace(r.servo, lag_width=lag) for r in smooth]
         smooth = [dataclasses.replace(r, servo=servo) for r, servo in zip(smooth, servos, strict=True)]
         return dataclasses.replace(self, recordings=recordings, smooth=smooth)
+
+
+def payloads_taken_off(data: Comparison) -> Comparison:
+    """The same as if nothing had been carried: without what the model says that known payloads take."""
+    out = []
+    for r in data.smooth:
+        moving = (r.q, r.qd, r.qdd)
+        bare, loaded = (nominal_torques(robot, *moving).total for robot in (data.robot, carrying(data.robot, r.payload)))
+        out.append(dataclasses.replace(r, tau=r.tau - (loaded - bare), payload=None))
+    return dataclasses.replace(data, smooth=out)
 
 
 def comparison(
@@ -82,7 +100,7 @@ def comparison(
     """
     moves = np.where(robot.is_slide, MOVING[1], MOVING[0])
     recordings, servo_notes = with_servo_torques(recordings, robot, uncertainty)
-    recordings = [with_lost_torque_marked(checked_numbers(r), moves, robot) for r in recordings]
+    recordings = [with_lost_torque_marked(checked_numbers(r), moves, carrying(robot, r.payload)) for r in recordings]
     recordings, twice = without_copies(recordings)
     progress("smoothing and differentiating the positions")
     band, recordings, smooth, again = comparable(robot, recordings)

@@ -15,7 +15,7 @@ from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
 from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import Nuisances, nuisances
+from irb140_jax.mismatch.regression.nuisances import COMMON, Nuisances, nuisances, payloads
 from irb140_jax.mismatch.regression.proposals import left_over, suggested, with_proposals
 from irb140_jax.mismatch.regression.rows import (
     Stretch,
@@ -200,7 +200,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     data = dataclasses.replace(data, stretches=held)
     ex = Explanation(
         lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
-        unproved=start.unproved, times=start.times,
+        unproved=start.unproved, times=start.times, payloads=tuple(r.recording.payload for r in start.along),
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
 
@@ -223,6 +223,9 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
         phases, _ = ex.phases(given.drive)
         times = Times(ex.command_delay(given.drive)[0], ex.torque_lag(), tuple(phases.tolist()))
         known = [dataclasses.replace(a, recording=r) for a, r in zip(known, given.later(times), strict=True)]
+    if any(ex.payloads):
+        moved = zip(known, ex.payloads_found(), strict=True)
+        known = all_prepared(robot, [dataclasses.replace(a.recording, payload=p) for a, p in moved])
     along = [seen_by(better, r) for r in known]
     torques = [torques_of(robot, physics, r, found[0], found[0], i) for i, r in enumerate(along)]
     noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
@@ -240,14 +243,17 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
 
 
 def _centre(space: Space, drive: Drive | None, start: _Start) -> np.ndarray:
-    """Prior means of the common nuisances, see `Space`: rows are made with the times that were found so far."""
-    out = np.zeros(space.offset - space.inertials)
+    """Prior means of the common nuisances, see `Space`: rows are made with what was found so far."""
+    found, widths = np.zeros((2, space.offset - space.inertials))
+    moved = np.ravel([p.off for p in payloads([a.recording for a in start.along])])
+    at = slice(COMMON, COMMON + len(moved))
+    found[at], widths[at] = moved, settings.PAYLOAD_PLACED
     if drive is not None and start.round > 1:
-        times, phase = start.times, np.full(len(start.times.phases), drive.phase_width)
-        found = np.array([0.0, times.lag, 0.0, *times.phases, times.delay])
-        widths = np.array([0.0, LAG_WIDTH, 0.0, *phase, drive.common_delay_width])
-        out = -np.divide(found, widths, out=out, where=widths > 0.0)
-    return out
+        times, last = start.times, len(start.times.phases) + 1
+        found[1], widths[1] = times.lag, LAG_WIDTH
+        found[-last:] = *times.phases, times.delay
+        widths[-last:] = *(drive.phase_width for _ in times.phases), drive.common_delay_width
+    return -np.divide(found, widths, out=np.zeros(len(found)), where=widths > 0.0)
 
 
 def _first_noise(

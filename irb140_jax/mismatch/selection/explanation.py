@@ -22,6 +22,7 @@ from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.screening import gains, near, reshaped
 from irb140_jax.recordings.drive import LAG_WIDTH, Drive, Times
 from irb140_jax.recordings.low_pass import Band
+from irb140_jax.recordings.payload import Payload
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,6 +45,7 @@ class Explanation:
         scaled: Whether one scale of all logged torques is a finding.
         unproved: What the search found and unseen motions speak against: not named.
         times: When drives act, by which torques of its rows were made.
+        payloads: What the tool carried in each recording, by which its rows were made.
         rigid: The fit of the inertials alone, from all blocks of the data or all but some: it predicts where nothing is
             named.  None in logs of commands, where drives err beside it.
     """
@@ -63,6 +65,7 @@ class Explanation:
     scaled: bool = False
     unproved: tuple[Site, ...] = ()
     times: Times = Times()
+    payloads: tuple[Payload | None, ...] = ()
     rigid: Callable[[np.ndarray | None], Posterior] | None = None
 
     @property
@@ -174,11 +177,25 @@ class Explanation:
         Both of shape (recordings,), or empty where there is one recording.
         """
         mean, cov = self.space.posterior(self.chosen, self.hyper)
-        mine = slice(self.space.inertials + COMMON, self.space.offset - 1)
+        mine = slice(self.space.offset - 1 - self._phases, self.space.offset - 1)
         count = len(mean[mine])
         made = np.array(self.times.phases or np.zeros(count))
         beside = stated.phase_width * (np.eye(count) - 1.0 / max(count, 1))
         return made + beside @ mean[mine], np.sqrt(np.diag(beside @ cov[mine, mine] @ beside.T))
+
+    def payloads_found(self) -> tuple[Payload | None, ...]:
+        """What the tool carried in each recording, where it was found to sit."""
+        mean, _ = self.space.posterior(self.chosen, self.hyper)
+        moved, out = settings.PAYLOAD_PLACED * mean[self.space.inertials + COMMON :], dict[Payload | None, Payload]()
+        for k, p in enumerate(dict.fromkeys(p for p in self.payloads if p)):
+            x, y, z = np.add(p.off, moved[3 * k : 3 * k + 3]).tolist()
+            out[p] = dataclasses.replace(p, off=(x, y, z))
+        return tuple(out.get(p) for p in self.payloads)
+
+    @property
+    def _phases(self) -> int:
+        """How many nuisances phases of recordings are."""
+        return len(self.extra) if len(self.extra) > 1 else 0
 
     def _common(self, at: int, width: float) -> tuple[float, float]:
         """A time that all joints share, from that with which the rows were made, and its standard deviation [s]."""
