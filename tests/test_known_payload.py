@@ -66,6 +66,7 @@ def test_torque_constants_that_are_all_wrong_are_named():
     (finding,) = diagnosis.findings
     assert (finding.effect, finding.joints) == ("torque_gain", robot.joint_names)
     gain = finding.parameters["gain"]
+    assert gain.value and gain.std
     assert abs(gain.value * 1.15 - 1.0) < 0.03 and abs(gain.value - 1.0 / 1.15) < 2.0 * gain.std
     assert "by what the known payload adds to it" in finding.certain
     assert diagnosis.verdict == "physics_left_out" and not diagnosis.unexplained

@@ -125,7 +125,7 @@ class Work:
         # `irb140 diagnose` does not replace what another command wrote: the command that is kept names another folder.
         command = Diagnose(
             unit.recordings, pathlib.Path(f"{place}-2"), unit.robot, self.inertial_uncertainty, unit.columns,
-            self.hold, self.fix_base,
+            self.hold, fix_base=self.fix_base,
         )
         command.write(command.diagnosed(), folder, place)
         write_manifest(folder, "irb140 diagnose-many")

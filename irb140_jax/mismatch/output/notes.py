@@ -32,12 +32,7 @@ def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]
     robot, band = data.robot, data.band
     out = [f"Model {robot.name}: {_sentence(note)}" for note in robot.notes]
     out += [f"{r.source}: {_sentence(note)}" for r in data.smooth for note in r.notes]
-    out += [
-        f"{r.source}: the tool carries {r.payload.mass:g} kg that the model does not hold, {_place(r.payload)}, give or "
-        f"take {100 * settings.PAYLOAD_PLACED:g} cm along each axis (--known-payload); the fit moves it by "
-        f"{', '.join(f'{100 * x:.1f}' for x in r.payload.off)} cm."
-        for r in data.smooth if r.payload
-    ]  # fmt: skip
+    out += [f"{r.source}: {_payload_note(r.payload)}" for r in data.smooth if r.payload]
     for name, count, lost, enough in zip(robot.joint_names, data.rows, mostly_lost(data.smooth), judged, strict=True):
         if not enough:
             why = f"dead or frozen channels and gaps leave {count} usable rows of it" if lost else (
@@ -202,8 +197,13 @@ def _discrepancy_of_joint(ex: Explanation, j: int, own: np.ndarray) -> str:
     return f"{robot.joint_names[j]} {digits(size)} {unit} RMS, most of it with {GOES_WITH[most]}"
 
 
-def _place(payload: Payload) -> str:
-    return f"at {', '.join(f'{x:g}' for x in payload.at)} m from it" if any(payload.at) else "with its centre at the tool"
+def _payload_note(payload: Payload) -> str:
+    place = f"{', '.join(f'{x:g}' for x in payload.at)} m from it" if any(payload.at) else "with its centre there"
+    moved = ", ".join(f"{100 * x:.1f}" for x in payload.off)
+    return (
+        f"the tool carries {payload.mass:g} kg that the model does not hold, {place}, give or take "
+        f"{100 * settings.PAYLOAD_PLACED:g} cm along each axis (--known-payload); the fit moves it by {moved} cm."
+    )
 
 
 def _sentence(note: str) -> str:

@@ -78,8 +78,8 @@ def payloads_taken_off(data: Comparison) -> Comparison:
     """The same as if nothing had been carried: without what the model says that known payloads take."""
     out = []
     for r in data.smooth:
-        moving = (r.q, r.qd, r.qdd)
-        bare, loaded = (nominal_torques(robot, *moving).total for robot in (data.robot, carrying(data.robot, r.payload)))
+        both = data.robot, carrying(data.robot, r.payload)
+        bare, loaded = (nominal_torques(robot, r.q, r.qd, r.qdd).total for robot in both)
         out.append(dataclasses.replace(r, tau=r.tau - (loaded - bare), payload=None))
     return dataclasses.replace(data, smooth=out)
 
