@@ -86,7 +86,8 @@ irb140 compare may.csv june.csv --robot arm.xml --out c     recordings, each of 
         if unit.problem:
             raise InputError(f"{unit.problem}; or give the folder of a diagnosis")
         command = Diagnose(
-            unit.recordings, self.out, unit.robot, self.inertial_uncertainty, unit.columns, self.hold, fix_base=self.fix_base
+            unit.recordings, self.out, unit.robot, self.inertial_uncertainty, unit.columns, self.hold,
+            fix_base=self.fix_base,
         )
         made[name] = command, command.diagnosed()
         return Given(name, made[name][1].diagnosis)

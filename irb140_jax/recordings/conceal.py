@@ -99,6 +99,7 @@ class ConcealedCase:
 def conceal(
     mjcf: str | pathlib.Path, concealments: Sequence[Concealment] = (), motions: Sequence[Excitation] | None = None, *,
     seed: int, noise: Noise | None = None, inertial_error: float = 0.05, rate: float = 500.0, with_speeds: bool = False,
+    with_link_encoders: bool = False,
 ) -> ConcealedCase:
     """Hide effects in an arm and record it in closed loop.
 
@@ -113,6 +114,7 @@ def conceal(
         inertial_error: Relative standard deviation of the true inertials about the nominal ones.
         rate: Samples per second of the recordings [1/s].
         with_speeds: Whether the recordings hold qd and qdd (true ones, without noise) as well.
+        with_link_encoders: Whether they hold positions behind the transmissions, as noisy as the others.
 
     Returns:
         The case.
@@ -136,6 +138,9 @@ def conceal(
         _recording(log, name, robot.joint_names, survey, noise, step, with_speeds, rng)
         for log, name, rng in zip(logs, _names(motions), rngs, strict=True)
     )
+    if with_link_encoders:
+        each = zip(recordings, logs, rngs, strict=True)
+        recordings = tuple(_with_link_encoders(r, log, noise, rng) for r, log, rng in each)
     left_out = left_out_share(rigid, logs, every=max(1, round(0.02 / dt)))
     truth = {
         "schema": 1, "seed": seed, "inertial_error": inertial_error,
@@ -292,6 +297,14 @@ def _recording(
         t=t[keep], q=q[keep], tau=tau[keep], qd=qd[keep] if with_speeds else None,
         qdd=qdd[keep] if with_speeds else None, extras={}, joint_names=tuple(names), source=name, notes=(),
     )
+
+
+def _with_link_encoders(recording: Recording, log: Log, noise: Noise, rng: np.random.Generator) -> Recording:
+    """The recording with `q_link.<joint>` columns."""
+    t, names = recording.t, recording.joint_names
+    q = np.stack([np.interp(t, log.t, x) for x in log.q_link.T], axis=1)
+    q = q + noise.encoder * rng.normal(size=q.shape)
+    return dataclasses.replace(recording, extras={f"q_link.{name}": q[:, j] for j, name in enumerate(names)})
 
 
 def _torque_noise(noise: Noise, shape: tuple[int, int], dt: float, rng: np.random.Generator) -> np.ndarray:

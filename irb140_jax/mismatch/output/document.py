@@ -13,6 +13,7 @@ from irb140_jax.mismatch.corrected.native import native_gap
 from irb140_jax.mismatch.output import views
 from irb140_jax.mismatch.output.findings import torque_scale_finding
 from irb140_jax.mismatch.output.inertials import link_shifts
+from irb140_jax.mismatch.output.link_encoders import link_encoder_notes
 from irb140_jax.mismatch.output.notes import (
     discrepancy_notes,
     friction_notes,
@@ -170,7 +171,8 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
         *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo)]
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
     return [
-        *of.data.servo_notes, *harmful_notes(robot, of.harmful), *open_joints,
+        *of.data.servo_notes, *link_encoder_notes(of.data, of.model, of.findings),
+        *harmful_notes(robot, of.harmful), *open_joints,
         *rest_notes(robot, of.proof, np.hypot(*of.sensors)),
         *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names, judged),
         *channels, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,

@@ -53,11 +53,14 @@ def closed_loop(
     held = lambda x: np.concatenate([np.repeat(x[:1], before, axis=0), x])  # noqa: E731
     wanted, time = held(motion.qdd + kp * motion.q + kd * motion.qd), held(motion.t)
     q, qd, tau = np.empty((steps, n)), np.empty((steps + 1, n)), np.empty((steps, n))
+    q_link, inner = np.empty((steps, n)), plant.inside
     acting = [effect for effect in hidden if type(effect).act is not Hidden.act]
     for k in range(steps):
         plant.t = time[k]
         plant.q, plant.qd = data.qpos[plant.qpos], data.qvel[dofs]
         q[k], qd[k] = plant.q + plant.zero, plant.qd
+        q_link[k] = plant.q
+        q_link[k, list(inner)] += data.qpos[list(inner.values())]
         control.qpos[:], control.qvel[:] = q[k], qd[k]
         control.qacc[:] = wanted[k] - kp * q[k] - kd * qd[k]
         mujoco.mj_inverse(nominal, control)
@@ -77,7 +80,8 @@ def closed_loop(
         raise InputError(
             f"motion {motion.name!r}: the closed loop becomes unstable; hide less, or sample the motion finer"
         )
-    log = Log(motion.t, q[before:], qd[before:-1], np.diff(qd[before:], axis=0) / plant.dt, tau[before:])
+    qdd = np.diff(qd[before:], axis=0) / plant.dt
+    log = Log(motion.t, q[before:], qd[before:-1], qdd, tau[before:], q_link[before:])
     for effect in hidden:
         log = effect.measured(log)
     return log

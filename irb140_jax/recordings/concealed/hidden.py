@@ -16,6 +16,7 @@ class Plant:
     Attributes:
         model, data: MuJoCo's; `model` may have joints inside transmissions beside the named ones.
         qpos, dofs: Addresses of the named joints.
+        inside: Addresses of positions inside transmissions, by joint.
         dt, t: Step and time [s].
         q, qd: True positions and velocities of the named joints, shape (n,).
         zero: Error of the encoders' zeros, shape (n,).
@@ -30,6 +31,8 @@ class Plant:
         self.model, self.data = model, mujoco.MjData(model)
         self.qpos = np.array([model.joint(name).qposadr[0] for name in names])
         self.dofs = np.array([model.joint(name).dofadr[0] for name in names])
+        joints = {model.joint(i).name: int(model.jnt_qposadr[i]) for i in range(model.njnt)}
+        self.inside = {j: joints[f"{name} inside"] for j, name in enumerate(names) if f"{name} inside" in joints}
         self.dt, self.t, self.recording = float(model.opt.timestep), 0.0, recording
         self.own_friction = model.dof_frictionloss[self.dofs].copy()
         n = len(names)
@@ -46,6 +49,7 @@ class Log(NamedTuple):
         q: Joint positions as the encoders see them, wrong zeros and motor sides included, shape (T, n).
         qd, qdd: True joint velocities and accelerations, shape (T, n).
         tau: What the controller logged, shape (T, n).
+        q_link: Joint positions behind the transmission, shape (T, n).
     """
 
     t: np.ndarray
@@ -53,6 +57,7 @@ class Log(NamedTuple):
     qd: np.ndarray
     qdd: np.ndarray
     tau: np.ndarray
+    q_link: np.ndarray
 
 
 class Survey(NamedTuple):
