@@ -102,13 +102,15 @@ def _bend(data: Comparison, apart: Sequence[np.ndarray], carried: Sequence[np.nd
         spread = np.sqrt((len(rows) - 1) / len(rows) * np.sum((without - without.mean(axis=0)) ** 2, axis=0))
         compliance, gap, error = zip(values(everything).tolist(), spread.tolist(), strict=True)
         bend = Bend(compliance, gap, error, cycles)
-        if _clear(bend.error):  # else it only blurs what else there is
+        # Of hundreds of waves the best is beyond chance now and then, but not beyond a single position's noise.
+        if _clear(bend.error, max(r.q_noise[j] for r in data.smooth)):
             break
+        bend = bend._replace(error=(0.0, 0.0))  # it only blurs what else there is
     return bend
 
 
-def _clear(x: tuple[float, float]) -> bool:
-    return x[0] > settings.VISIBLE * x[1]
+def _clear(x: tuple[float, float], least: float = 0.0) -> bool:
+    return x[0] > max(settings.VISIBLE * x[1], least)
 
 
 def _cycles(rows: np.ndarray) -> float:
