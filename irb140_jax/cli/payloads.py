@@ -1,5 +1,6 @@
 """What the tool carried in some recordings, as the command line says it."""
 
+import math
 import pathlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -9,12 +10,8 @@ from irb140_jax.errors import InputError
 if TYPE_CHECKING:
     from irb140_jax.recordings import Payload
 
-HEAVIEST = 1e4  # [kg] more is a number in grams
 
-
-def known_payloads(
-    words: Sequence[str], recordings: Sequence[pathlib.Path]
-) -> "dict[pathlib.Path, Payload]":
+def known_payloads(words: Sequence[str], recordings: Sequence[pathlib.Path]) -> "dict[pathlib.Path, Payload]":
     """Known payloads by recording, from words such as "loaded.csv=2.5" or "loaded.csv=2.5@0,0,0.05".
 
     Args:
@@ -44,7 +41,7 @@ def _parsed(word: str) -> "tuple[str, Payload]":
     mass, _, place = numbers.partition("@")
     try:
         at = tuple(map(float, place.split(","))) if place else (0.0, 0.0, 0.0)
-        if not name or len(at) != 3 or not 0.0 < float(mass) < HEAVIEST or not all(abs(x) < HEAVIEST for x in at):
+        if not name or len(at) != 3 or not 0.0 < float(mass) < math.inf or not all(map(math.isfinite, at)):
             raise ValueError
         return name, Payload(float(mass), at)
     except ValueError:

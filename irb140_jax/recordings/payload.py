@@ -5,6 +5,7 @@ the links weigh, so that a wrong torque constant can no longer be taken for link
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -28,26 +29,27 @@ class Payload:
 
 
 def carrying(robot: Robot, payload: Payload | None) -> Robot:
-    """The robot with a known body on its tool, or as it is."""
+    """The robot with a known body on its tool, or as it is where there is none."""
     if payload is None:
         return robot
-    c = _centre(robot, payload)
-    held = about_origin(robot.tool_position) @ jnp.asarray(payload.mass * np.concatenate([[1.0], c, _square(c, c)]))
-    return with_phi(robot, robot.phi.at[-1].add(held))
+    return with_phi(robot, robot.phi.at[-1].add(jnp.asarray(_inertials(robot, payload, np.zeros(3)))))
 
 
 def inertials_per_metre(robot: Robot, payload: Payload) -> np.ndarray:
-    """How the inertial parameters of the last link change as the body moves along each axis of the tool, (10, 3)."""
-    c, axes = _centre(robot, payload), np.asarray(robot.tool_rotation).T
-    moved = np.stack([np.concatenate([[0.0], axis, 2.0 * _square(c, axis)]) for axis in axes], axis=1)
-    return payload.mass * np.asarray(about_origin(robot.tool_position)) @ moved
+    """How the last link's inertial parameters change as the body moves along each axis of the tool, shape (10, 3).
+
+    Per metre, at where it was found.  They are parabolas of its place, of which a central difference is the slope.
+    """
+    there = lambda x: _inertials(robot, payload, x)  # noqa: E731
+    return np.stack([0.5 * (there(axis) - there(-axis)) for axis in np.eye(3)], axis=1)
 
 
-def _centre(robot: Robot, payload: Payload) -> np.ndarray:
-    """From the tool, along the axes of the last link [m]."""
-    return np.asarray(robot.tool_rotation) @ np.add(payload.at, payload.off)
+def distinct(carried: Sequence[Payload | None]) -> list[Payload]:
+    """What the tool carried in any of some recordings, once each, in the order of the recordings."""
+    return [*dict.fromkeys(payload for payload in carried if payload)]
 
 
-def _square(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(a . b) 1 - (a b' + b a') / 2 as Ixx, Ixy, Ixz, Iyy, Iyz, Izz."""
-    return (a @ b * np.eye(3) - 0.5 * (np.outer(a, b) + np.outer(b, a)))[np.triu_indices(3)]
+def _inertials(robot: Robot, payload: Payload, moved: np.ndarray) -> np.ndarray:
+    """Inertial parameters of the body in the frame of the last link, shape (10,), moved along the tool's axes [m]."""
+    from_tool = np.asarray(robot.tool_rotation) @ (np.add(payload.at, payload.off) + moved)
+    return payload.mass * np.asarray(about_origin(robot.tool_position + from_tool))[:, 0]

@@ -11,9 +11,8 @@ from irb140_jax.mismatch.columns.along import Prepared
 from irb140_jax.mismatch.regression.discrepancy import features
 from irb140_jax.mismatch.regression.servo import common_columns, damping_of_scale, scale_width, servo_columns
 from irb140_jax.mismatch.regression.tangent import Point, delayed, late
-from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
-from irb140_jax.recordings.payload import Payload, inertials_per_metre
+from irb140_jax.recordings.payload import distinct, inertials_per_metre
 from irb140_jax.robot import Robot
 
 # A joint's own columns with stated widths, in their order; those of a servo come after them.
@@ -64,7 +63,7 @@ def payload_columns(robot: Robot, along: Sequence[Prepared]) -> list[np.ndarray]
         robot: The nominal model.
         along: The recordings.  Those with the same payload carried the same body.
     """
-    carried, out = payloads([a.recording for a in along]), []
+    carried, out = distinct([a.recording.payload for a in along]), []
     for a in along:
         dphi = np.zeros((robot.n, 10, 3 * len(carried)))
         for p in (p for p in carried if p == a.recording.payload):
@@ -72,11 +71,6 @@ def payload_columns(robot: Robot, along: Sequence[Prepared]) -> list[np.ndarray]
             dphi[-1, :, at : at + 3] = settings.PAYLOAD_PLACED * inertials_per_metre(robot, p)
         out.append(a.torque_of(dphi.reshape(10 * robot.n, -1)))
     return out
-
-
-def payloads(recordings: Sequence[Conditioned]) -> list[Payload]:
-    """What the tool carried in any of some recordings, once each."""
-    return [*dict.fromkeys(r.payload for r in recordings if r.payload)]
 
 
 def nuisances(

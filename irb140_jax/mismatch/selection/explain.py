@@ -15,7 +15,7 @@ from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
 from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import COMMON, Nuisances, nuisances, payloads
+from irb140_jax.mismatch.regression.nuisances import COMMON, Nuisances, nuisances
 from irb140_jax.mismatch.regression.proposals import left_over, suggested, with_proposals
 from irb140_jax.mismatch.regression.rows import (
     Stretch,
@@ -36,6 +36,7 @@ from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.drive import LAG_WIDTH, Drive, Times
 from irb140_jax.recordings.low_pass import Band
+from irb140_jax.recordings.payload import distinct
 from irb140_jax.robot import Robot
 
 MOST_ROUNDS = 8  # shapes may become finer and finer
@@ -245,7 +246,7 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
 def _centre(space: Space, drive: Drive | None, start: _Start) -> np.ndarray:
     """Prior means of the common nuisances, see `Space`: rows are made with what was found so far."""
     found, widths = np.zeros((2, space.offset - space.inertials))
-    moved = np.ravel([p.off for p in payloads([a.recording for a in start.along])])
+    moved = np.ravel([p.off for p in distinct([a.recording.payload for a in start.along])])
     at = slice(COMMON, COMMON + len(moved))
     found[at], widths[at] = moved, settings.PAYLOAD_PLACED
     if drive is not None and start.round > 1:

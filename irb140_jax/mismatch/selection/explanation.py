@@ -22,7 +22,7 @@ from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.screening import gains, near, reshaped
 from irb140_jax.recordings.drive import LAG_WIDTH, Drive, Times
 from irb140_jax.recordings.low_pass import Band
-from irb140_jax.recordings.payload import Payload
+from irb140_jax.recordings.payload import Payload, distinct
 
 
 @dataclasses.dataclass(frozen=True)
@@ -187,7 +187,7 @@ class Explanation:
         """What the tool carried in each recording, where it was found to sit."""
         mean, _ = self.space.posterior(self.chosen, self.hyper)
         moved, out = settings.PAYLOAD_PLACED * mean[self.space.inertials + COMMON :], dict[Payload | None, Payload]()
-        for k, p in enumerate(dict.fromkeys(p for p in self.payloads if p)):
+        for k, p in enumerate(distinct(self.payloads)):
             x, y, z = np.add(p.off, moved[3 * k : 3 * k + 3]).tolist()
             out[p] = dataclasses.replace(p, off=(x, y, z))
         return tuple(out.get(p) for p in self.payloads)
