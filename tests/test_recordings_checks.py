@@ -231,6 +231,20 @@ def test_a_zero_within_reach_of_a_diagnosis_passes(robot, tmp_path):
         passes(changed(sound, q=sound.q + 0.4 * np.eye(3)[j]), robot, tmp_path)
 
 
+@pytest.mark.parametrize(("seed", "mass", "place"), [
+    (5, 4.9, (-0.21, 0.30, -0.35)), (3, 1.5, (-0.09, -0.34, -0.02)), (4, 1.8, (-0.30, -0.34, 0.03)),
+    (0, 3.5, (0.20, -0.26, -0.09)), (3, 2.3, (0.26, -0.26, 0.07)),
+])  # fmt: skip
+def test_a_payload_that_the_model_leaves_out_is_no_wrong_channel(robot, tmp_path, seed, mass, place):
+    arm = made.model()
+    own = arm.body_mass[-1]
+    arm.body_ipos[-1] = (own * arm.body_ipos[-1] + mass * np.array(place)) / (own + mass)
+    arm.body_mass[-1] = own + mass
+    # Each looks like a channel that is wrong otherwise, and that stays said.
+    notes = read(made.recording(seed=seed, speeds=False, arm=arm, friction=0.0), robot, tmp_path).notes
+    assert any("so does a payload" in note for note in notes)
+
+
 @pytest.mark.parametrize("angle", [1.2, 1.9])
 def test_a_centre_of_mass_that_hangs_elsewhere_on_the_last_link_is_no_wrong_zero_or_axis(robot, tmp_path, angle):
     sound = made.recording(seed=1, speeds=False)

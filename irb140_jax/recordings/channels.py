@@ -58,7 +58,7 @@ def channel_doubts(
             continue
         gain = float(np.sum(np.log((1.0 - given[judged] + 0.01) / (1.0 - after[judged] + 0.01)))) - cost
         if gain > 0.0 and (best is None or gain > best[0] + 0.5):
-            best = gain, doubt
+            best = gain, doubt._replace(explained=after)
     return [best[1]] if best else unit_doubts(recording, seen, model, judged)
 
 

@@ -5,17 +5,27 @@ tilted base, a payload.  So only what no physics could bring about is refused, a
 """
 
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from irb140_jax.effects.delay import HALVES
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.channels import channel_doubts
+from irb140_jax.recordings.channels import ORDER, channel_doubts
 from irb140_jax.recordings.check import MOVING
+from irb140_jax.recordings.doubt import Doubt
 from irb140_jax.recordings.glance import Glance
+from irb140_jax.recordings.hidden_payload import explained_by_a_payload
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.torque_shape import friction, lateness, lateness_of_all, ratio_to_model, share_of_power
+from irb140_jax.recordings.torque_shape import (
+    explained,
+    friction,
+    lateness,
+    lateness_of_all,
+    ratio_to_model,
+    share_of_power,
+)
 from irb140_jax.recordings.torques import Torques, nominal_torques
 from irb140_jax.robot import Robot
 
@@ -29,7 +39,8 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Rec
     """Refuse a recording whose positions are in degrees or whose channels have a wrong unit, sign, zero or joint.
 
     Returns:
-        The recording, with a note where torque comes so late that it looks reversed, or that no diagnosis finds it.
+        The recording, with a note where a channel looks wrong and a payload would look the same, or where torque comes
+        so late that it looks reversed, or that no diagnosis finds it.
 
     Raises:
         RecordingError: The nominal model says so beyond doubt.
@@ -43,10 +54,14 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Rec
     driven = moving & (np.std(seen.tau, axis=0) > MIN_SHARE * np.std(model.total, axis=0))
     late = {int(j): lateness(seen, model, int(j)) for j in _reversed(seen, model, driven)}
     on_time = moving & ~np.isin(np.arange(robot.n), [j for j, delay in late.items() if delay > 0.0])
-    _check_order(recording, seen, model, on_time)
-    _check_sign(recording, seen, model, driven & on_time)
-    for doubt in channel_doubts(recording, seen, robot, on_time, driven):
-        raise RecordingError(f"{recording.source}: {doubt.said}: {doubt.remedy}")
+    passed = []
+    for doubt in (
+        *_order_doubts(recording, seen, model, on_time), *_sign_doubts(recording, seen, model, driven & on_time),
+        *channel_doubts(recording, seen, robot, on_time, driven),
+    ):  # fmt: skip
+        if not explained_by_a_payload(doubt, seen, robot, model, on_time):
+            raise RecordingError(f"{recording.source}: {doubt.said}: {doubt.remedy}")
+        passed += [f"{doubt.said}; so does a payload that the model leaves out, and nothing is changed"]
     said = [f"tau.{recording.joint_names[j]} comes about {1000 * delay:.0f} ms after what the model needs: a drive "
             "that lags, or channels out of step" for j, delay in late.items() if delay > 0.0]  # fmt: skip
     if not said and abs(delay := lateness_of_all(seen, model, moving)) > LONGEST_DELAY:
@@ -54,7 +69,7 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Rec
         said = [f"The torque of most joints comes about {abs(1000 * delay):.0f} ms {when} what the model needs: drives "
                 "that lag, or channels out of step. Shift the torque by as much in time: a diagnosis finds delays up "
                 f"to {1000 * LONGEST_DELAY:.0f} ms, and takes a longer one for something else"]  # fmt: skip
-    return dataclasses.replace(recording, notes=(*recording.notes, *said))
+    return dataclasses.replace(recording, notes=(*recording.notes, *passed, *said))
 
 
 def explained_shares(seen: Glance, model: Torques) -> np.ndarray:
@@ -140,18 +155,21 @@ def _reversed(seen: Glance, model: Torques, driven: np.ndarray) -> np.ndarray:
     return np.flatnonzero(driven & ((wrong > CERTAIN) & (right < NONE) | fits))
 
 
-def _check_sign(recording: Recording, seen: Glance, model: Torques, driven: np.ndarray) -> None:
+def _sign_doubts(recording: Recording, seen: Glance, model: Torques, driven: np.ndarray) -> Iterator[Doubt]:
     reversed_ = _reversed(seen, model, driven)
     if len(reversed_):
         names = [recording.joint_names[j] for j in reversed_]
-        raise RecordingError(f"{recording.source}: column{'s' if len(names) > 1 else ''} "
-                             f"{', '.join('tau.' + x for x in names)} of the wrong sign: the reversed torque is what "
-                             f"the model and friction would need; map it with --columns and [scale] \"tau.{names[0]}\" "
-                             "= -1; if it is q that is reversed, or gravity or a zero in the model is turned round, "
-                             "mend that")
+        sign = np.where(np.isin(np.arange(len(driven)), reversed_), -1.0, 1.0)
+        yield Doubt(
+            "reversed torque", tuple(reversed_.tolist()), f"column{'s' if len(names) > 1 else ''} "
+            f"{', '.join('tau.' + x for x in names)} of the wrong sign: the reversed torque is what the model and "
+            "friction would need", f"map it with --columns and [scale] \"tau.{names[0]}\" = -1; if it is q that is "
+            "reversed, or gravity or a zero in the model is turned round, mend that",
+            {f"tau.{x}": -1.0 for x in names}, explained(seen, model, driven, sign * seen.tau),
+        )  # fmt: skip
 
 
-def _check_order(recording: Recording, seen: Glance, model: Torques, moving: np.ndarray) -> None:
+def _order_doubts(recording: Recording, seen: Glance, model: Torques, moving: np.ndarray) -> Iterator[Doubt]:
     shares = explained_shares(seen, model)
     # Misfit of the model's torque of joint j, as it is, to tau_k.
     misfit = np.stack([_misfit(seen.tau, model.total[:, [j]]) for j in range(len(shares))])
@@ -164,10 +182,14 @@ def _check_order(recording: Recording, seen: Glance, model: Torques, moving: np.
                 and size[j, k] > MIN_SHARE}
         pairs = [j for j in sorted(sure) if best[j] in sure]
         if pairs:
-            names = recording.joint_names
+            names, order = recording.joint_names, np.arange(len(best))
+            order[pairs] = best[pairs]
             text = ", ".join(f"tau.{names[best[j]]} fits joint {names[j]}" for j in pairs)
-            raise RecordingError(f"{recording.source}: torque columns look exchanged: {text}; put the columns in "
-                                 "order, or exchange them with --columns FILE.toml")
+            yield Doubt(
+                "exchanged torque", tuple(pairs), f"torque columns look exchanged: {text}", ORDER, {},
+                explained(seen, model, moving & moving[order], seen.tau[:, order]),
+            )  # fmt: skip
+            return
 
 
 def _misfit(tau: np.ndarray, model: np.ndarray) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 
 class Doubt(NamedTuple):
     """Something wrong with whole channels.
@@ -13,6 +15,8 @@ class Doubt(NamedTuple):
         said: A sentence that names the columns.
         remedy: What would mend it.
         scale: Factors, by column, that would; empty where none do.
+        explained: Share of each joint's torque that the model explains once it is mended, shape (n,); None where that
+            is not what speaks for it.
     """
 
     kind: str
@@ -20,3 +24,4 @@ class Doubt(NamedTuple):
     said: str
     remedy: str
     scale: dict[str, float]
+    explained: np.ndarray | None = None
