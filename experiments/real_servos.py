@@ -20,8 +20,7 @@ from scipy import signal
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.mismatch import Result, diagnose, predict
-from irb140_jax.mismatch.motion.models import compiled_robot, simulated
-from irb140_jax.oracle.rollout import positions
+from irb140_jax.mismatch.motion.models import compiled_robot, moved, simulated
 from irb140_jax.recordings import Recording
 from irb140_jax.recordings.drive import ARRAYS, Drive
 from irb140_jax.recordings.machines import (
@@ -66,7 +65,7 @@ def told(result: Result) -> dict[str, Any]:
 def off(result: Result, runs: Sequence[Recording]) -> dict[str, list[np.ndarray]]:
     """Positions less those simulated from the commands of runs that the fit did not see, by model [rad].
 
-    Of the corrected model it is its file alone, without what MJCF can't hold.
+    The corrected model is its file with the friction that MJCF can't hold, and without whatever else it can't.
     """
     robot, out = result.model.robot, {name: [] for name in ("nominal", "refit", "corrected")}
     models = simulated(result.model, compiled_robot(robot, SIMULATED), SIMULATED)
@@ -76,8 +75,8 @@ def off(result: Result, runs: Sequence[Recording]) -> dict[str, list[np.ndarray]
         times = np.arange(run.t[0], run.t[-1], SIMULATED)
         asked = np.stack([np.interp(times, run.t, x) for x in taken_up(run, drive).T], axis=1)[None]
         for name, apart in out.items():
-            start, still = run.q[:1], np.zeros_like(run.q[:1])
-            went = positions([models.driven(name, drive)], start, still, np.zeros_like(asked), asked)[0, :-1]
+            start, still, began = run.q[:1], np.zeros_like(run.q[:1]), np.zeros(1)
+            went = moved([models], name, [drive], start, still, np.zeros_like(asked), asked, began)[0, :-1]
             apart.append(run.q - np.stack([np.interp(run.t, times, x) for x in went.T], axis=1))
     return out
 

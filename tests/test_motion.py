@@ -16,6 +16,7 @@ from irb140_jax.mismatch.columns.torques import Named
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.corrected.native import beyond_file
 from irb140_jax.mismatch.motion import proof_in_motion
+from irb140_jax.mismatch.motion.friction import without_those
 from irb140_jax.mismatch.motion.sentences import lost, sentences
 from irb140_jax.mismatch.motion.windows import Span, spans, windows
 from irb140_jax.oracle.rollout import positions, simulated_model
@@ -121,18 +122,21 @@ def test_a_torque_constant_in_the_gear_is_undone_in_the_simulation():
     assert joint["corrected"]["median"][5] < 0.02 * joint["refit"]["median"][5]
 
 
-def test_what_mjcf_cannot_hold_is_applied_as_torque_and_said():
+def test_friction_that_mjcf_cannot_hold_acts_where_the_motion_goes_and_other_torque_as_computed():
     both = named("asymmetric_friction", 0, 1.0, 3.0)
     robot, recording = robot_of(ARM), recorded(viscous=0.0)
-    law = recording.tau + np.stack([np.where(recording.qd[:, 0] > 0, 1.0, -3.0), 0.3 * np.sin(recording.t)], axis=1)
-    model, recording = model_of(robot, both), dataclasses.replace(recording, tau=law)
-    missing = beyond_file(model, [recording], [law])  # the sine, which the file does not hold
+    friction, other = np.where(recording.qd[:, 0] > 0, 1.0, -3.0), 0.3 * np.sin(recording.t)
+    bare = recording.tau + np.stack([0.0 * other, other], axis=1)
+    recording = dataclasses.replace(recording, tau=bare + np.stack([friction, 0.0 * friction], axis=1))
+    model = model_of(robot, both)
+    missing = beyond_file(without_those(model), [recording], [bare])  # the sine, which the file does not hold
     made = proof_in_motion(robot, lambda _: model, [Span(0, 0, 0.0, 5.99)], [recording], missing or [])
-    assert made and made["as_torque"] == ["friction that differs by direction"]
-    assert "applied as a torque" in made["sentences"][-1]
+    assert made and made["as_friction"] == ["friction that differs by direction"] and not made["as_torque"]
+    assert "acted as it is where the simulated motion goes" in made["sentences"][-1]
     for joint in made["joints"].values():
         assert joint["corrected"]["median"][5] < 0.1 * joint["refit"]["median"][5]
     assert made["joints"]["b"]["file"]["median"][5] > 5 * made["joints"]["b"]["corrected"]["median"][5]
+    assert any("applied as a torque" in x for x in sentences(made | {"as_torque": ["a coupling"]}))
 
 
 def test_a_joint_without_inertia_follows_the_recording_and_the_others_are_judged():
@@ -168,8 +172,8 @@ def test_where_every_model_is_lost_the_text_says_from_when():
     curve = lambda *values: {"median": list(values), "p90": list(values)}  # noqa: E731
     tool = {"unit": "mm", "nominal": curve(1.0, 9.0, None), "refit": curve(1.0, 8.0, 90.0),
             "corrected": curve(0.1, 2.0, 40.0), "moved": curve(3.0, 6.0, 20.0)}  # fmt: skip
-    made = {"horizon": [0.1, 0.5, 2.0], "windows": 7, "tool": tool, "whole_run": None, "as_torque": [], "followed": [],
-            "driven_by": "torque"}  # fmt: skip
+    made = {"horizon": [0.1, 0.5, 2.0], "windows": 7, "tool": tool, "whole_run": None, "as_torque": [],
+            "as_friction": [], "followed": [], "driven_by": "torque"}  # fmt: skip
     assert lost(made) == 2.0
     assert any("From 2 s on every model is farther off" in sentence for sentence in sentences(made))
     tool["corrected"] = curve(0.1, 2.0, 19.0)

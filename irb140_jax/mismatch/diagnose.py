@@ -147,7 +147,7 @@ def _diagnosed(
     diagnosis = document(of, provenance(robot, data.recordings, config.options, config.words))
     open_ = undecided(ex, found, seen, matters, data.band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
-    motion = motion_unseen(bare, ex, proof, refit.loose, beyond)
+    motion = motion_unseen(bare, ex, proof, refit.loose, model, beyond)
     return Result(diagnosis, model, report_views(of, diagnosis.notes, motion), open_)
 
 

@@ -2,12 +2,17 @@
 
 import copy
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 from mujoco import rollout
+
+# From times since the start (B,) [s], positions, speeds and the joints' load without friction, (B, n) each, to what dry
+# friction can hold and to other torque that motors need, (B, n) each [N m or N].
+Friction = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+HELD = 0.005  # s for which such friction stays as it is: shorter than arms take to change their load or speed
 
 
 def simulated_model(text: str, step: float) -> mujoco.MjModel:
@@ -46,17 +51,69 @@ def positions(
     """
     n = q.shape[1]
     start = np.concatenate([np.zeros((len(q), 1)), q, qd], axis=1)  # of mjSTATE_FULLPHYSICS: time, qpos, qvel
-    threads = [mujoco.MjData(models[0]) for _ in range(min(len(q), os.cpu_count() or 1))]
+    state = _states(models, start, tau, control)
+    return np.concatenate([q[:, None], np.where(_ended(start, state), np.inf, state[..., 1 : 1 + n])], axis=1)
+
+
+def positions_with_friction(
+    models: Sequence[mujoco.MjModel],
+    q: Float[np.ndarray, "B n"],
+    qd: Float[np.ndarray, "B n"],
+    tau: Float[np.ndarray, "B S n"],
+    control: Float[np.ndarray, "B S n"] | None,
+    friction: Friction,
+) -> Float[np.ndarray, "B S+1 n"]:
+    """The same with friction beside the models' own that changes along the motions; it stays for `HELD` each time."""
+    n, step = q.shape[1], models[0].opt.timestep
+    rubbing, bare = ([copy.copy(m) for m in models] for _ in range(2))
+    own = np.stack([m.dof_frictionloss for m in models])
+    for m in bare:
+        m.dof_frictionloss[:] = m.dof_damping[:] = 0.0
+    datas = [mujoco.MjData(m) for m in bare]
+    state, went = np.concatenate([np.zeros((len(q), 1)), q, qd], axis=1), [q[:, None]]
+    ended, qdd, every = np.zeros((len(q), 1), dtype=bool), np.zeros_like(q), max(round(HELD / step), 1)
+    for first in range(0, tau.shape[1], every):
+        at = slice(first, first + every)
+        load = np.stack([_load(m, d, s, a) for m, d, s, a in zip(bare, datas, state, qdd, strict=True)])
+        level, torque = friction(state[:, 0], state[:, 1 : 1 + n], state[:, 1 + n :], load)
+        for m, loss in zip(rubbing, own + level, strict=True):
+            m.dof_frictionloss[:] = loss
+        given = tau[:, at] - torque[:, None]
+        after = _states(rubbing, state, given, None if control is None else control[:, at])
+        gone = _ended(state, after) | ended[:, None]
+        went.append(np.where(gone, np.inf, after[..., 1 : 1 + n]))
+        ended = gone[:, -1]
+        # What flew away stays where it last was, and is infinite all the same.
+        last = np.where(ended, state, after[:, -1])
+        qdd, state = (last - state)[:, 1 + n :] / (given.shape[1] * step), last
+    return np.concatenate(went, axis=1)
+
+
+def _load(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    """What the joints need without friction, shape (n,)."""
+    data.qpos[:], data.qvel[:], data.qacc[:] = state[1 : 1 + model.nq], state[1 + model.nq :], qdd
+    mujoco.mj_inverse(model, data)
+    return data.qfrc_inverse.copy()
+
+
+def _states(
+    models: Sequence[mujoco.MjModel], start: np.ndarray, tau: np.ndarray, control: np.ndarray | None
+) -> np.ndarray:
+    """States after each step, (B, S, 1 + 2 n): time, positions, speeds."""
+    threads = [mujoco.MjData(models[0]) for _ in range(min(len(start), os.cpu_count() or 1))]
     mujoco.set_mju_user_warning(lambda _: None)  # or MuJoCo writes a file about motions that fly away
     try:
         spec, given = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), np.ascontiguousarray(tau)
         if control is not None:  # comes first in MuJoCo's order
             spec, given = spec | int(mujoco.mjtState.mjSTATE_CTRL), np.concatenate([control, tau], axis=-1)
-        state, _ = rollout.rollout(list(models), threads, start, given, control_spec=spec)
+        return rollout.rollout(list(models), threads, start, given, control_spec=spec)[0]
     finally:
         mujoco.set_mju_user_warning(None)
-    ended = np.diff(state[..., :1], axis=1, prepend=0.0) <= 0.0  # MuJoCo gave up: time stands still
-    return np.concatenate([q[:, None], np.where(ended, np.inf, state[..., 1 : 1 + n])], axis=1)
+
+
+def _ended(start: np.ndarray, state: np.ndarray) -> np.ndarray:
+    """Where MuJoCo gave up, (B, S, 1): time stands still."""
+    return np.diff(state[..., :1], axis=1, prepend=start[:, None, :1]) <= 0.0
 
 
 def tool_positions(model: mujoco.MjModel, q: Float[np.ndarray, "... n"]) -> Float[np.ndarray, "... 3"]:

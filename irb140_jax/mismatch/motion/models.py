@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -11,8 +12,9 @@ import numpy as np
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.corrected.native import limited, native_robot
 from irb140_jax.mismatch.inertials.consistent import of_bodies_or_nominal
+from irb140_jax.mismatch.motion.friction import friction_of, without_those
 from irb140_jax.oracle.mujoco import mass_matrix
-from irb140_jax.oracle.rollout import simulated_model
+from irb140_jax.oracle.rollout import positions, positions_with_friction, simulated_model
 from irb140_jax.recordings.condition import Commanded, Conditioned
 from irb140_jax.recordings.drive import Drive
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
@@ -28,7 +30,8 @@ class Simulated:
 
     Attributes:
         model: The corrected model.
-        compiled: By name; "corrected" is the text of corrected.xml.
+        compiled: By name; "file" is the text of corrected.xml, and "corrected" the same but for friction laws that are
+            more than MJCF's numbers, which act beside it.
         gear: Joint torque in that file per torque that the controller asks for, shape (n,).
     """
 
@@ -85,13 +88,39 @@ def simulated(model: CorrectedModel, nominal: mujoco.MjModel, step: float) -> Si
         nominal: The model as given, compiled.
         step: Time step [s].
     """
-    corrected = native_robot(model)
-    robots = {"refit": _refitted(model), "corrected": corrected}
+    file, bare = native_robot(model), without_those(model)
+    robots = {"refit": _refitted(model), FILE: file} | ({} if bare is model else {"corrected": native_robot(bare)})
     compiled = {name: compiled_robot(robot, step) for name, robot in robots.items()}
     if any(m.nv != model.robot.n for m in compiled.values()):
         return None
-    compiled[FILE] = compiled["corrected"]
-    return Simulated(model, {"nominal": nominal} | compiled, np.asarray(corrected.gear) / np.asarray(model.robot.gear))
+    compiled = {"nominal": nominal, "corrected": compiled[FILE]} | compiled
+    return Simulated(model, compiled, np.asarray(file.gear) / np.asarray(model.robot.gear))
+
+
+def moved(
+    models: Sequence[Simulated], name: str, drives: Sequence[Drive | None], start: np.ndarray, speed: np.ndarray,
+    tau: np.ndarray, control: np.ndarray, began: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Where one of the models goes in motions side by side, (B, S + 1, n) [rad or m]; see `rollout.positions`.
+
+    Args:
+        models: Of each motion.
+        name: Which model.
+        drives: Of each motion's servos, None where there are none.
+        start, speed, tau, control: As `rollout.positions` has them.
+        began: Time since its recording began at which each motion starts, shape (B,) [s].
+    """
+    driven = [m.driven(name, drive) for m, drive in zip(models, drives, strict=True)]
+    friction = friction_of([m.model for m in models], began) if name == "corrected" else None
+    if friction is None:
+        return positions(driven, start, speed, tau, control)
+    free = driven[0].dof_armature < FLYWHEEL
+
+    def on_free(*state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        level, torque = friction(*state)
+        return free * level, free * torque
+
+    return positions_with_friction(driven, start, speed, tau, control, on_free)
 
 
 def asked(servo: Commanded) -> np.ndarray:

@@ -7,18 +7,11 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.mismatch.corrected.model import CorrectedModel
-from irb140_jax.mismatch.motion.models import (
-    FILE,
-    Simulated,
-    asked,
-    compiled_robot,
-    leading,
-    led,
-    simulated,
-)
+from irb140_jax.mismatch.motion.friction import beyond_numbers
+from irb140_jax.mismatch.motion.models import FILE, Simulated, asked, compiled_robot, leading, led, moved, simulated
 from irb140_jax.mismatch.motion.sentences import MODELS, sentences, subject
 from irb140_jax.mismatch.motion.windows import FINEST, FINEST_SERVO, LONGEST, Span, Window, windows
-from irb140_jax.oracle.rollout import positions, tool_positions
+from irb140_jax.oracle.rollout import tool_positions
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.robot import Robot
 
@@ -37,7 +30,7 @@ def proof_in_motion(
         of_fold: The corrected model that has not seen a fold.
         unseen: What each fold leaves out.
         recordings: The conditioned recordings.
-        missing: What corrected.xml can't hold along each, from `beyond_file` [N m or N].
+        missing: What corrected.xml can't hold along each, from `beyond_file`, but for friction [N m or N].
 
     Returns:
         Errors of each model by joint and at the tool; None where nothing can be simulated.
@@ -63,9 +56,10 @@ def proof_in_motion(
         return None
     if follow.any():
         ready = {fold: dataclasses.replace(m, compiled=led(m.compiled, follow)) for fold, m in ready.items()}
-    laws = [n.effect for m in ready.values() for n in m.model.named]
-    lacking = list(dict.fromkeys(law.title for law in laws if law.export.not_in_mjcf))
-    names = (*MODELS, FILE) if lacking else MODELS
+    titles = lambda laws: [*dict.fromkeys(n.effect.title for n in laws if n.effect.export.not_in_mjcf)]  # noqa: E731
+    rubs = titles(n for m in ready.values() for n in beyond_numbers(m.model))
+    lacking = [x for x in titles(n for m in ready.values() for n in m.model.named) if x not in rubs]
+    names = (*MODELS, FILE) if lacking or rubs else MODELS
     logged = [0.0 * r.tau if drives else r.tau for r in recordings]
     applied = lambda name, w: leading(  # noqa: E731
         ready[w.fold].torque(name, logged[w.recording], missing[w.recording]), recordings[w.recording], follow
@@ -86,6 +80,7 @@ def proof_in_motion(
         "whole_run": _over_runs(over, {robot.joint_names[j]: (j, units[j]) for j in free}),
         "followed": [robot.joint_names[j] for j in np.flatnonzero(follow)],
         "as_torque": lacking,
+        "as_friction": rubs,
     }  # fmt: skip
     return out | {"shown": subject(out)[0].removeprefix("the "), "sentences": sentences(out)}
 
@@ -97,26 +92,26 @@ def _errors(
     """By model, and as "moved" for a robot that stays where it is: errors of all joints and, last, at the tool,
     shape (windows, times, n + 1) [rad, m]; NaN beyond the end of a window."""
     tool_of = models[cut[0].fold].compiled["nominal"]
-    batch = [(w, name) for name in names for w in cut]
     longest = max(w.last - w.first for w in cut)
     n = recordings[0].q.shape[1]
-    tau, control = np.zeros((2, len(batch), longest * parts, n))
-    start, speed = np.zeros((2, len(batch), n))
-    for b, (w, name) in enumerate(batch):
+    tau, control = np.zeros((2, len(cut), longest * parts, n))
+    start, speed = np.zeros((2, len(cut), n))
+    fine = [w.first + np.arange((w.last - w.first) * parts) / parts for w in cut]
+    for b, w in enumerate(cut):
         r = recordings[w.recording]
-        fine = w.first + np.arange((w.last - w.first) * parts) / parts
-        tau[b, : len(fine)] = _between(applied(name, w), fine)
         if r.servo is not None:
-            control[b, : len(fine)] = _between(asked(r.servo), fine)
+            control[b, : len(fine[b])] = _between(asked(r.servo), fine[b])
         start[b] = r.q[w.first]
         speed[b] = r.qd[w.first] - 0.5 * (r.t[1] - r.t[0]) / parts * r.qdd[w.first]
-    servos = [r.servo and r.servo.drive for r in recordings]
-    driven = [models[w.fold].driven(name, servos[w.recording]) for w, name in batch]
-    went = positions(driven, start, speed, tau, control)[:, ::parts]
+    of_windows = [models[w.fold] for w in cut]
+    servos = [(r := recordings[w.recording]).servo and r.servo.drive for w in cut]
+    began = np.array([(r := recordings[w.recording]).t[w.first] - r.began for w in cut])
     true, still, simulated_ = (np.full((len(cut), len(times), n), np.nan) for _ in range(3))
     out = {}
-    for first, name in enumerate(names):
-        own = went[first * len(cut) :]
+    for name in names:
+        for b, w in enumerate(cut):
+            tau[b, : len(fine[b])] = _between(applied(name, w), fine[b])
+        own = moved(of_windows, name, servos, start, speed, tau, control, began)[:, ::parts]
         for k, w in enumerate(cut):
             r = recordings[w.recording]
             rows = np.round(times / (r.t[1] - r.t[0])).astype(int)

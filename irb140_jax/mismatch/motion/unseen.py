@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.mismatch.corrected.fitted import fitted_model
-from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
+from irb140_jax.mismatch.corrected.native import beyond_file
+from irb140_jax.mismatch.motion.friction import without_those
 from irb140_jax.mismatch.motion.proof import proof_in_motion
 from irb140_jax.mismatch.motion.windows import spans
 from irb140_jax.mismatch.regression.sufficient_data import Comparison
@@ -15,8 +17,9 @@ from irb140_jax.mismatch.validation.held_out import HeldOut, recordings_of_block
 
 
 def motion_unseen(
-    data: Comparison, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], beyond: Sequence[np.ndarray] | None
-) -> dict[str, Any] | None:
+    data: Comparison, ex: Explanation, proof: HeldOut, loose: tuple[int, ...], model: CorrectedModel,
+    beyond: Sequence[np.ndarray] | None,
+) -> dict[str, Any] | None:  # fmt: skip
     """What motion.json holds; None where a joint's torque was lost, so that nothing can be simulated.
 
     Args:
@@ -24,11 +27,15 @@ def motion_unseen(
         ex: The explanation.
         proof: The fits without each fold.
         loose: Candidates of the refit: inertials wrong beyond their stated uncertainty.
-        beyond: What corrected.xml can't hold along each recording, from `beyond_file`; None where unknown.
+        model: The corrected model, of all recordings.
+        beyond: What corrected.xml can't hold of it along each recording, from `beyond_file`; None where unknown.
     """
     lost = any(r.torque_lost is not None and r.torque_lost.any() for r in data.recordings if not r.is_servo_log)
     if beyond is None or lost:
         return None
+    if (bare := without_those(model)) is not model:
+        beyond = beyond_file(bare, data.smooth, [torques_along(bare, r).corrected for r in data.smooth])
+        assert beyond is not None  # or it would have been None before
     unseen = spans([fold.blocks for fold in proof.folds], recordings_of_blocks(ex), [s.t for s in ex.data.stretches])
 
     def of_fold(k: int) -> CorrectedModel:
