@@ -16,7 +16,7 @@ from irb140_jax.mismatch.columns.torques import Named
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.corrected.native import beyond_file
 from irb140_jax.mismatch.motion import proof_in_motion
-from irb140_jax.mismatch.motion.friction import without_those
+from irb140_jax.mismatch.motion.laws import without_those
 from irb140_jax.mismatch.motion.sentences import lost, sentences
 from irb140_jax.mismatch.motion.windows import Span, spans, windows
 from irb140_jax.oracle.rollout import positions, simulated_model
@@ -131,7 +131,7 @@ def test_friction_that_mjcf_cannot_hold_acts_where_the_motion_goes_and_other_tor
     model = model_of(robot, both)
     missing = beyond_file(without_those(model), [recording], [bare])  # the sine, which the file does not hold
     made = proof_in_motion(robot, lambda _: model, [Span(0, 0, 0.0, 5.99)], [recording], missing or [])
-    assert made and made["as_friction"] == ["friction that differs by direction"] and not made["as_torque"]
+    assert made and made["as_law"] == ["friction that differs by direction"] and not made["as_torque"]
     assert "acted as it is where the simulated motion goes" in made["sentences"][-1]
     for joint in made["joints"].values():
         assert joint["corrected"]["median"][5] < 0.1 * joint["refit"]["median"][5]
@@ -173,7 +173,7 @@ def test_where_every_model_is_lost_the_text_says_from_when():
     tool = {"unit": "mm", "nominal": curve(1.0, 9.0, None), "refit": curve(1.0, 8.0, 90.0),
             "corrected": curve(0.1, 2.0, 40.0), "moved": curve(3.0, 6.0, 20.0)}  # fmt: skip
     made = {"horizon": [0.1, 0.5, 2.0], "windows": 7, "tool": tool, "whole_run": None, "as_torque": [],
-            "as_friction": [], "followed": [], "driven_by": "torque"}  # fmt: skip
+            "as_law": [], "followed": [], "driven_by": "torque"}  # fmt: skip
     assert lost(made) == 2.0
     assert any("From 2 s on every model is farther off" in sentence for sentence in sentences(made))
     tool["corrected"] = curve(0.1, 2.0, 19.0)

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float
 from mujoco import rollout
 
-# From times since the start (B,) [s], positions, speeds and the joints' load without friction, (B, n) each, to what dry
-# friction can hold and to other torque that motors need, (B, n) each [N m or N].
-Friction = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-HELD = 0.005  # s for which such friction stays as it is: shorter than arms take to change their load or speed
+# From times since the start (B,) [s], positions, speeds, the load of the joints without friction and controls, (B, n)
+# each, to what dry friction can hold and to other torque that motors need, (B, n) each [N m or N].
+Law = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+HELD = 0.005  # s for which that stays as it is: shorter than arms take to change their load or speed
 
 
 def simulated_model(text: str, step: float) -> mujoco.MjModel:
@@ -55,31 +55,32 @@ def positions(
     return np.concatenate([q[:, None], np.where(_ended(start, state), np.inf, state[..., 1 : 1 + n])], axis=1)
 
 
-def positions_with_friction(
+def positions_under_law(
     models: Sequence[mujoco.MjModel],
     q: Float[np.ndarray, "B n"],
     qd: Float[np.ndarray, "B n"],
     tau: Float[np.ndarray, "B S n"],
     control: Float[np.ndarray, "B S n"] | None,
-    friction: Friction,
+    law: Law,
 ) -> Float[np.ndarray, "B S+1 n"]:
-    """The same with friction beside the models' own that changes along the motions; it stays for `HELD` each time."""
+    """The same under a law beside the models' own numbers; what it gives is held for `HELD` each time."""
     n, step = q.shape[1], models[0].opt.timestep
     rubbing, bare = ([copy.copy(m) for m in models] for _ in range(2))
     own = np.stack([m.dof_frictionloss for m in models])
     for m in bare:
         m.dof_frictionloss[:] = m.dof_damping[:] = 0.0
+    asked = np.zeros(tau.shape) if control is None else control
     datas = [mujoco.MjData(m) for m in bare]
     state, went = np.concatenate([np.zeros((len(q), 1)), q, qd], axis=1), [q[:, None]]
     ended, qdd, every = np.zeros((len(q), 1), dtype=bool), np.zeros_like(q), max(round(HELD / step), 1)
     for first in range(0, tau.shape[1], every):
         at = slice(first, first + every)
         load = np.stack([_load(m, d, s, a) for m, d, s, a in zip(bare, datas, state, qdd, strict=True)])
-        level, torque = friction(state[:, 0], state[:, 1 : 1 + n], state[:, 1 + n :], load)
+        level, torque = law(state[:, 0], state[:, 1 : 1 + n], state[:, 1 + n :], load, asked[:, first])
         for m, loss in zip(rubbing, own + level, strict=True):
             m.dof_frictionloss[:] = loss
         given = tau[:, at] - torque[:, None]
-        after = _states(rubbing, state, given, None if control is None else control[:, at])
+        after = _states(rubbing, state, given, None if control is None else asked[:, at])
         gone = _ended(state, after) | ended[:, None]
         went.append(np.where(gone, np.inf, after[..., 1 : 1 + n]))
         ended = gone[:, -1]

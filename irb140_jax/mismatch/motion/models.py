@@ -12,9 +12,9 @@ import numpy as np
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.corrected.native import limited, native_robot
 from irb140_jax.mismatch.inertials.consistent import of_bodies_or_nominal
-from irb140_jax.mismatch.motion.friction import friction_of, without_those
+from irb140_jax.mismatch.motion.laws import law_of, without_those
 from irb140_jax.oracle.mujoco import mass_matrix
-from irb140_jax.oracle.rollout import positions, positions_with_friction, simulated_model
+from irb140_jax.oracle.rollout import positions, positions_under_law, simulated_model
 from irb140_jax.recordings.condition import Commanded, Conditioned
 from irb140_jax.recordings.drive import Drive
 from irb140_jax.robot import Robot, robot_mjcf, with_phi
@@ -30,8 +30,8 @@ class Simulated:
 
     Attributes:
         model: The corrected model.
-        compiled: By name; "file" is the text of corrected.xml, and "corrected" the same but for friction laws that are
-            more than MJCF's numbers, which act beside it.
+        compiled: By name; "file" is the text of corrected.xml, and "corrected" the same but for laws that are more
+            than MJCF's numbers, which act beside it.
         gear: Joint torque in that file per torque that the controller asks for, shape (n,).
     """
 
@@ -111,16 +111,16 @@ def moved(
         began: Time since its recording began at which each motion starts, shape (B,) [s].
     """
     driven = [m.driven(name, drive) for m, drive in zip(models, drives, strict=True)]
-    friction = friction_of([m.model for m in models], began) if name == "corrected" else None
-    if friction is None:
+    law = law_of([m.model for m in models], drives, [m.gear for m in models], began) if name == "corrected" else None
+    if law is None:
         return positions(driven, start, speed, tau, control)
     free = driven[0].dof_armature < FLYWHEEL
 
     def on_free(*state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        level, torque = friction(*state)
+        level, torque = law(*state)
         return free * level, free * torque
 
-    return positions_with_friction(driven, start, speed, tau, control, on_free)
+    return positions_under_law(driven, start, speed, tau, control, on_free)
 
 
 def asked(servo: Commanded) -> np.ndarray:

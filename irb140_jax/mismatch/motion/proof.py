@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.mismatch.corrected.model import CorrectedModel
-from irb140_jax.mismatch.motion.friction import beyond_numbers
+from irb140_jax.mismatch.motion.laws import beyond_numbers
 from irb140_jax.mismatch.motion.models import FILE, Simulated, asked, compiled_robot, leading, led, moved, simulated
 from irb140_jax.mismatch.motion.sentences import MODELS, sentences, subject
 from irb140_jax.mismatch.motion.windows import FINEST, FINEST_SERVO, LONGEST, Span, Window, windows
@@ -30,7 +30,7 @@ def proof_in_motion(
         of_fold: The corrected model that has not seen a fold.
         unseen: What each fold leaves out.
         recordings: The conditioned recordings.
-        missing: What corrected.xml can't hold along each, from `beyond_file`, but for friction [N m or N].
+        missing: What corrected.xml can't hold along each, from `beyond_file`, but for `beyond_numbers` [N m or N].
 
     Returns:
         Errors of each model by joint and at the tool; None where nothing can be simulated.
@@ -57,9 +57,9 @@ def proof_in_motion(
     if follow.any():
         ready = {fold: dataclasses.replace(m, compiled=led(m.compiled, follow)) for fold, m in ready.items()}
     titles = lambda laws: [*dict.fromkeys(n.effect.title for n in laws if n.effect.export.not_in_mjcf)]  # noqa: E731
-    rubs = titles(n for m in ready.values() for n in beyond_numbers(m.model))
-    lacking = [x for x in titles(n for m in ready.values() for n in m.model.named) if x not in rubs]
-    names = (*MODELS, FILE) if lacking or rubs else MODELS
+    beside = titles(n for m in ready.values() for n in beyond_numbers(m.model))
+    lacking = [x for x in titles(n for m in ready.values() for n in m.model.named) if x not in beside]
+    names = (*MODELS, FILE) if lacking or beside else MODELS
     logged = [0.0 * r.tau if drives else r.tau for r in recordings]
     applied = lambda name, w: leading(  # noqa: E731
         ready[w.fold].torque(name, logged[w.recording], missing[w.recording]), recordings[w.recording], follow
@@ -80,7 +80,7 @@ def proof_in_motion(
         "whole_run": _over_runs(over, {robot.joint_names[j]: (j, units[j]) for j in free}),
         "followed": [robot.joint_names[j] for j in np.flatnonzero(follow)],
         "as_torque": lacking,
-        "as_friction": rubs,
+        "as_law": beside,
     }  # fmt: skip
     return out | {"shown": subject(out)[0].removeprefix("the "), "sentences": sentences(out)}
 

@@ -33,13 +33,13 @@ def sentences(proof: Mapping[str, Any]) -> list[str]:
         why = "without any inertia in one of the models, so that torque alone can't drive it" if by_torque else (
             "not driven, for its gains are not known or one of the models has no inertia there")
         said.append(f"{', '.join(proof['followed'])}: {why}; in all models it follows the recording.")
-    if outside := [*proof["as_torque"], *proof["as_friction"]]:
+    if outside := [*proof["as_torque"], *proof["as_law"]]:
         alone = [f"{_with_unit(row['file']['median'][horizon.index(time)], row['unit'])} after {time:g} s"
                  for time in SAID_AT if middle["moved"][horizon.index(time)] is not None]  # fmt: skip
         how = ["what it lacks was applied as a torque computed along the recorded motion, which favours the corrected "
                "model"] * bool(proof["as_torque"])  # fmt: skip
-        if proof["as_friction"]:
-            how.append(f"{', '.join(proof['as_friction'])} acted as it is where the simulated motion goes")
+        if proof["as_law"]:
+            how.append(f"{', '.join(proof['as_law'])} acted as it is where the simulated motion goes")
         said.append(f"corrected.xml can't hold {', '.join(outside)} in whole or in part; {'; '.join(how)}. With "
                     f"the file alone {what} is off by {', '.join(alone)}.")  # fmt: skip
     return said

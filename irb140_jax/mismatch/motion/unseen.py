@@ -8,7 +8,7 @@ import numpy as np
 from irb140_jax.mismatch.corrected.fitted import fitted_model
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file
-from irb140_jax.mismatch.motion.friction import without_those
+from irb140_jax.mismatch.motion.laws import without_those
 from irb140_jax.mismatch.motion.proof import proof_in_motion
 from irb140_jax.mismatch.motion.windows import spans
 from irb140_jax.mismatch.regression.sufficient_data import Comparison

@@ -1,0 +1,78 @@
+"""Laws that MJCF has no numbers for, in simulations of the corrected model."""
+
+import mujoco
+import numpy as np
+import pytest
+from helpers import random_robot
+
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch.columns.torques import Named
+from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.motion.laws import law_of, without_those
+from irb140_jax.oracle.rollout import positions_under_law, simulated_model
+from irb140_jax.recordings.drive import stated_drive
+from irb140_jax.recordings.low_pass import Band
+
+STEP, CONSTANT, SLOPE = 1e-3, 0.05, 0.3
+PENDULUM = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
+  <body><joint name="hinge" axis="0 1 0" damping="0.02" frictionloss="0.01"/>
+    <inertial pos="0 0 -0.1" mass="0.5" diaginertia="1e-4 1e-4 1e-4"/></body>
+</worldbody><actuator><position joint="hinge" kp="2" kv="0.05"/></actuator></mujoco>"""
+
+
+def stepped(control: np.ndarray) -> np.ndarray:
+    """Positions by MuJoCo step by step, whose level follows the forces that MuJoCo itself reports."""
+    model = simulated_model(PENDULUM, STEP)
+    data, out = mujoco.MjData(model), []
+    for u in control:
+        out.append(data.qpos[0])
+        load = data.qfrc_actuator[0] + data.qfrc_passive[0] + data.qfrc_constraint[0]  # damping is friction, too
+        model.dof_frictionloss[0] = 0.01 + CONSTANT + SLOPE * abs(load)
+        data.ctrl[:] = u
+        mujoco.mj_step(model, data)
+    return np.array([*out, data.qpos[0]])
+
+
+def test_friction_that_grows_with_load_acts_as_step_by_step():
+    t = np.arange(4000) * STEP
+    control = 1.2 * np.sin(2.0 * np.pi * 0.6 * t) + 0.3 * np.sin(2.0 * np.pi * 1.7 * t)
+    friction = lambda t, q, qd, load, control: (CONSTANT + SLOPE * np.abs(load), 0.0 * q)  # noqa: E731
+    none = np.zeros((1, 1))
+    given = np.zeros((1, len(t), 1)), control[None, :, None]
+    went = positions_under_law([simulated_model(PENDULUM, STEP)], none, none, *given, friction)[0, :, 0]
+    without = positions_under_law(
+        [simulated_model(PENDULUM, STEP)], none, none, *given, lambda t, q, *_: (0.0 * q, 0.0 * q)
+    )[0, :, 0]
+    true = stepped(control)
+    apart = lambda x: float(np.sqrt(np.mean((x - true) ** 2)))  # noqa: E731
+    # Held for 5 ms each time, and by accelerations that are as old.
+    assert apart(went) < 0.05 * apart(without) and apart(without) > 0.02
+
+
+KP = 20.0
+
+
+@pytest.mark.parametrize(
+    ("slug", "amplitudes", "shape", "level", "torque"),
+    [
+        ("load_dependent_friction", (0.2, 0.3), (), lambda q, qd, load, u: 0.2 + 0.3 * np.abs(load), None),
+        ("stribeck_friction", (0.2, 0.1), (0.5,), lambda q, qd, load, u: 0.2 + 0.1 * np.exp(-((qd / 0.5) ** 2)), None),
+        ("asymmetric_friction", (0.3, 0.2), (), lambda q, qd, load, u: 0.25, lambda q, u: 0.05),
+        ("servo_deadband", (1.0,), (0.3,), lambda q, qd, load, u: 0.0,
+         lambda q, u: 2.0 * KP * np.clip(u - q, -0.3, 0.3)),
+    ],
+)  # fmt: skip
+def test_a_law_is_parted_into_what_holds_and_what_pushes(slug, amplitudes, shape, level, torque):
+    robot, rng, joint = random_robot("HSH", 3)[0], np.random.default_rng(0), 1
+    effect, phi = CATALOGUE[slug], np.asarray(robot.phi)
+    named = Named(effect, (joint,), tuple(range(effect.law.width)), np.array(amplitudes), np.array(shape))
+    model = CorrectedModel(robot, phi, phi, (named,), Band(10.0, 16.0, 200.0, 4), np.full(robot.n, 0.01))
+    drive, gear = stated_drive(np.full(robot.n, KP), np.zeros(robot.n)), np.full(robot.n, 2.0)
+    law = law_of([model] * 5, [drive] * 5, [gear] * 5, np.zeros(5))
+    assert law is not None
+    q, qd, load, control = rng.normal(size=(4, 5, robot.n))
+    holds, pushes = law(np.zeros(5), q, qd, load, control)
+    only = np.arange(robot.n) == joint
+    np.testing.assert_allclose(holds, np.where(only, level(q, qd, load, control), 0.0) + 0.0 * q, atol=1e-12)
+    np.testing.assert_allclose(pushes, np.where(only, torque(q, control) if torque else 0.0, 0.0) + 0.0 * q, atol=1e-12)
+    assert not without_those(model).named and law_of([without_those(model)], [drive], [gear], np.zeros(1)) is None
