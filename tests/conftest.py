@@ -16,6 +16,8 @@ if "PYTEST_XDIST_WORKER" not in os.environ and "JAX_COMPILATION_CACHE_DIR" not i
     # Of the workers and of the commands that the tests run, too.
     os.environ["JAX_COMPILATION_CACHE_DIR"] = folder
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.05"
+    # Two workers keep two cores busy; each with two threads for its small matrices, a quarter of all time is waiting.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Most programs run once here, so that compiling them well takes longer than it saves: a fifth of such files' time.
     os.environ["XLA_FLAGS"] = f"--xla_backend_optimization_level=0 {os.environ.get('XLA_FLAGS', '')}".strip()
 

@@ -57,7 +57,8 @@ KP = 20.0
     [
         ("load_dependent_friction", (0.2, 0.3), (), lambda q, qd, load, u: 0.2 + 0.3 * np.abs(load), None),
         ("stribeck_friction", (0.2, 0.1), (0.5,), lambda q, qd, load, u: 0.2 + 0.1 * np.exp(-((qd / 0.5) ** 2)), None),
-        ("asymmetric_friction", (0.3, 0.2), (), lambda q, qd, load, u: 0.25, lambda q, u: 0.05),
+        ("asymmetric_friction", (0.3, 0.2), (), lambda q, qd, load, u: np.where(qd > 0.0, 0.3, 0.2), None),
+        ("nonlinear_viscous_friction", (0.4,), (2.0,), lambda q, qd, load, u: 0.4 * (qd**2 + 1e-8), None),
         ("servo_deadband", (1.0,), (0.3,), lambda q, qd, load, u: 0.0,
          lambda q, u: 2.0 * KP * np.clip(u - q, -0.3, 0.3)),
     ],

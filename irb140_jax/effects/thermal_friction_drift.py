@@ -13,15 +13,15 @@ FASTEST = 10.0  # s: no gear warms faster; what settles sooner is something else
 
 
 def _columns(motion, joints, shape):
-    """tau = Fv (1 - drop (1 - exp(-t/T))) qd, t since the recording began, cold."""
+    """tau = (cold exp(-t/T) + warm (1 - exp(-t/T))) qd, t since the recording began, cold; neither is below zero."""
     qd = of_site(motion.qd, joints)
-    warm = 1.0 - jnp.exp(-motion.t / shape[0])
-    return jnp.stack([qd, -warm[:, None] * qd], axis=-1)
+    cold = jnp.exp(-motion.t / shape[0])[:, None]
+    return jnp.stack([cold * qd, (1.0 - cold) * qd], axis=-1)
 
 
 def _from_physical(values):
     cold = values["viscous_cold"]
-    return np.array([cold, cold * values["relative_drop"]]), np.array([values["time_constant"]])
+    return np.array([cold, cold * (1.0 - values["relative_drop"])]), np.array([values["time_constant"]])
 
 
 def _grid(scales, joints):
@@ -50,17 +50,17 @@ EFFECT = Effect(
             Parameter("time_constant", "s", low=0.0),
         ),
         columns=_columns,
-        to_physical=lambda w, shape: jnp.stack([w[0], w[1] / jnp.where(w[0] == 0.0, 1.0, w[0]), shape[0]]),
+        to_physical=lambda w, shape: jnp.stack([w[0], 1.0 - w[1] / jnp.where(w[0] == 0.0, 1.0, w[0]), shape[0]]),
         from_physical=_from_physical,
         variants=((0, 1),),
         contains=("viscous_friction",),
     ),
     place=Place(At.FRICTION),
-    prior=Prior(lowest=(0.0, -np.inf), dissipative=True),
+    prior=Prior(lowest=(0.0, 0.0), dissipative=True),
     shapes=Shapes(grid=_grid, finer=between_neighbours),
     export=Export(
         mjcf="joint damping, as it is once warm",
         not_in_mjcf="the change is left out: damping does not depend on time",
-        in_model=lambda robot, joints, w, shape: with_joint(robot, "damping", joints[0], w[0] - w[1]),
+        in_model=lambda robot, joints, w, shape: with_joint(robot, "damping", joints[0], w[1]),
     ),
 )

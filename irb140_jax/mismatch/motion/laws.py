@@ -46,7 +46,7 @@ def law_of(
         began: Time since its recording began at which it starts, shape (B,) [s].
 
     Returns:
-        See `Law`; None where there are no such laws.
+        See `Law`; None where there are no such laws.  All that brakes a joint is dry friction there.
     """
     of_each = [beyond_numbers(m) for m in models]
     if not of_each[0]:
@@ -72,10 +72,17 @@ def law_of(
         given = [full(x) for x in (t + began, q, qd, load, kp * error - kd * qd, error, kp)]
         for effect, joints, shapes, amplitudes in numbers:
             there, back = np.asarray(_both_ways(effect, joints, shapes, amplitudes, rest_speed, *given))[:, : len(q)]
-            on_joint = gear[:, joints] if effect.place.at is At.ASKED else 1.0
-            levels[:, joints] += 0.5 * (there - back) * on_joint
-            torques[:, joints] += 0.5 * (there + back) * on_joint
-        return np.maximum(levels, 0.0), torques
+            level, torque = 0.5 * (there - back), 0.5 * (there + back)
+            if effect.place.at is At.ASKED:
+                level, torque = level * gear[:, joints], torque * gear[:, joints]
+            else:
+                # What brakes a joint that moves may stop it and can't turn it round, however long it is held.
+                way = np.clip(qd / rest_speed, -1.0, 1.0)[:, joints]
+                brakes = np.maximum(level + way * torque, 0.0)
+                level, torque = brakes, torque - way * (brakes - level)
+            levels[:, joints] += level
+            torques[:, joints] += torque
+        return levels, torques
 
     return law
 
