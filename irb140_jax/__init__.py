@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from irb140_jax.library import Diagnosis as Diagnosis
     from irb140_jax.library import diagnose as diagnose
     from irb140_jax.library import read_recording as read_recording
+    from irb140_jax.mismatch import CorrectedMujoco as CorrectedMujoco
     from irb140_jax.mismatch import load_corrected as load_corrected
     from irb140_jax.recordings import Recording as Recording
     from irb140_jax.recordings.excite import fourier_motion as fourier_motion
@@ -44,9 +45,9 @@ _SUBPACKAGES = (
     "robot", "simulate", "swarm",
 )
 _REEXPORTED = {
-    "Diagnosis": "library", "Recording": "recordings", "Robot": "robot", "Trajectory": "trajectory",
+    "CorrectedMujoco": "mismatch", "Diagnosis": "library", "Recording": "recordings", "Robot": "robot",
     "diagnose": "library", "fourier_motion": "recordings.excite", "irb140": "robot", "load_corrected": "mismatch",
-    "load_robot": "robot", "read_recording": "library",
+    "load_robot": "robot", "read_recording": "library", "Trajectory": "trajectory",
 }
 __all__ = [*_SUBPACKAGES, *_REEXPORTED]  # pyright: ignore[reportUnsupportedDunderAll]
 

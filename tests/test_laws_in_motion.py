@@ -1,14 +1,18 @@
 """Laws that MJCF has no numbers for, in simulations of the corrected model."""
 
+import json
+
 import mujoco
 import numpy as np
 import pytest
 from helpers import random_robot
 
+from irb140_jax import CorrectedMujoco
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.columns.torques import Named
-from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.corrected.model import CorrectedModel, to_json
 from irb140_jax.mismatch.motion.laws import law_of, without_those
+from irb140_jax.mismatch.motion.models import FILE, compiled_robot, moved, simulated
 from irb140_jax.oracle.rollout import positions_under_law, simulated_model
 from irb140_jax.recordings.drive import stated_drive
 from irb140_jax.recordings.low_pass import Band
@@ -77,3 +81,33 @@ def test_a_law_is_parted_into_what_holds_and_what_pushes(slug, amplitudes, shape
     np.testing.assert_allclose(holds, np.where(only, level(q, qd, load, control), 0.0) + 0.0 * q, atol=1e-12)
     np.testing.assert_allclose(pushes, np.where(only, torque(q, control) if torque else 0.0, 0.0) + 0.0 * q, atol=1e-12)
     assert not without_those(model).named and law_of([without_those(model)], [drive], [gear], np.zeros(1)) is None
+
+
+def test_a_users_own_simulation_goes_where_the_proof_in_motion_goes(tmp_path):
+    """Servos on a random arm whose friction grows with load, stepped by MuJoCo alone."""
+    robot = random_robot("HHH", 5)[0]
+    n, phi = robot.n, np.asarray(robot.phi)
+    effect = CATALOGUE["load_dependent_friction"]
+    named = tuple(Named(effect, (j,), (0, 1), np.array([0.1, 0.2]), np.zeros(0)) for j in range(n))
+    drive = stated_drive(np.full(n, 200.0), np.full(n, 20.0))
+    model = CorrectedModel(robot, phi, phi, named, Band(10.0, 16.0, 200.0, 4), np.full(n, 0.01), drive=drive)
+    (tmp_path / "model.json").write_text(json.dumps(to_json(model)))
+    t = np.arange(1500) * STEP
+    control = 0.5 * np.sin(2.0 * np.pi * np.array([0.7, 0.9, 1.3]) * t[:, None])
+    made = simulated(model, compiled_robot(robot, STEP), STEP)
+    assert made is not None
+    still = np.zeros((1, n))
+    ours = {name: moved([made], name, [drive], still, still, np.zeros((1, *control.shape)), control[None], np.zeros(1))
+            for name in ("corrected", FILE)}  # fmt: skip
+    taken = CorrectedMujoco(tmp_path)
+    taken.model.opt.timestep, taken.model.opt.integrator = STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    taken.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    data, went = mujoco.MjData(taken.model), []
+    data.qpos[:] = 0.0
+    for u in control:
+        went.append(data.qpos.copy())
+        data.ctrl[:] = u
+        taken.act(data)
+        mujoco.mj_step(taken.model, data)
+    apart = {name: np.abs(x[0, :-1] - np.array(went)).max() for name, x in ours.items()}
+    assert apart["corrected"] < 0.05 * apart[FILE] and apart[FILE] > 0.01

@@ -75,7 +75,7 @@ def positions_under_law(
     ended, qdd, every = np.zeros((len(q), 1), dtype=bool), np.zeros_like(q), max(round(HELD / step), 1)
     for first in range(0, tau.shape[1], every):
         at = slice(first, first + every)
-        load = np.stack([_load(m, d, s, a) for m, d, s, a in zip(bare, datas, state, qdd, strict=True)])
+        load = np.stack([joint_load(m, d, s, a) for m, d, s, a in zip(bare, datas, state, qdd, strict=True)])
         level, torque = law(state[:, 0], state[:, 1 : 1 + n], state[:, 1 + n :], load, asked[:, first])
         for m, loss in zip(rubbing, own + level, strict=True):
             m.dof_frictionloss[:] = loss
@@ -90,8 +90,8 @@ def positions_under_law(
     return np.concatenate(went, axis=1)
 
 
-def _load(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """What the joints need without friction, shape (n,)."""
+def joint_load(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    """What the joints need without friction in a state (1 + 2 n,): time, positions, speeds, shape (n,) [N m or N]."""
     data.qpos[:], data.qvel[:], data.qacc[:] = state[1 : 1 + model.nq], state[1 + model.nq :], qdd
     mujoco.mj_inverse(model, data)
     return data.qfrc_inverse.copy()

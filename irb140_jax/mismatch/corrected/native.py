@@ -37,9 +37,14 @@ def native_robot(model: CorrectedModel) -> Robot:
 
 def save_native(model: CorrectedModel, folder: pathlib.Path) -> None:
     """Write the corrected model as MJCF, and a page on what it holds, into an existing folder."""
-    robot = native_robot(model)
-    (folder / XML).write_text(robot_mjcf(robot, servos=_servos(model, robot)), encoding="utf-8")
+    (folder / XML).write_text(native_mjcf(model), encoding="utf-8")
     (folder / NOTES).write_text(_page(model), encoding="utf-8")
+
+
+def native_mjcf(model: CorrectedModel) -> str:
+    """Text of corrected.xml."""
+    robot = native_robot(model)
+    return robot_mjcf(robot, servos=_servos(model, robot))
 
 
 def _servos(model: CorrectedModel, native: Robot) -> ServoGains | None:
@@ -112,7 +117,10 @@ def _page(model: CorrectedModel) -> str:
         if part:
             lines += ["", f"## {title}", "", *(_line(model, n) for n in part)]
     if partly or without:
-        lines += ["", "For what the file lacks, use `irb140_jax.load_corrected` on this folder, or `irb140 predict`."]
+        lines += [
+            "", "For what the file lacks, use `irb140_jax.load_corrected` on this folder, or `irb140 predict`.",
+            "In a simulation by MuJoCo, laws of friction and of servos act by `irb140_jax.CorrectedMujoco`.",
+        ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 
