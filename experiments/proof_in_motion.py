@@ -79,7 +79,7 @@ def judged(files: Files) -> dict:
             rows.append({"time": time, "joint": joint, "named": joint in named, "nominal": row["nominal"]["median"][k],
                          "refit": refit, "corrected": corrected, "moved": moved,
                          "file": row["file"]["median"][k] if "file" in row else corrected})  # fmt: skip
-    kept = ("windows", "runs", "as_torque", "followed", "tool", "whole_run")
+    kept = ("windows", "runs", "as_torque", "as_law", "followed", "tool", "whole_run")
     return told | {key: motion[key] for key in kept} | {"rows": rows}
 
 
