@@ -19,10 +19,11 @@ from irb140_jax.cli import main
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import DiagnoseConfig, diagnose, save
-from irb140_jax.recordings import Drive, drive_of_model, read_recording, stated_drive, write_recording
+from irb140_jax.recordings import Drive, Payload, drive_of_model, read_recording, stated_drive, write_recording
 from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.servo import with_servo_torques, with_torque
 from irb140_jax.report import html_report
+from irb140_jax.robot import with_phi
 from testbed.runner import read_case
 from testbed.servos import make_servo
 
@@ -276,6 +277,25 @@ def test_a_servo_that_leaves_nothing_out_stays_silent_with_gains_ten_percent_wro
     result = diagnosed(robot, stated_drive(1.1 * np.array(KP), 1.1 * np.array(KD)))
     assert names(result) == set()
     assert "No torque was logged" in result.diagnosis.summary
+
+
+def test_a_known_payload_fixes_kp_and_with_it_the_unit_of_friction(robot):
+    """Of servos without any gains, on a model whose masses are all 15 % too small."""
+    plant = two_links(elbow='frictionloss="0.25"')
+    ball = '<body pos="0.01 -0.005 -.25"><inertial pos="0 0 0" mass="0.6" diaginertia="1e-6 1e-6 1e-6"/></body>'
+    loaded = plant.replace("</body></body></worldbody>", f"{ball}</body></body></worldbody>")
+    recordings = [closed_loop(xml, seed)[0] for xml, seed in ((plant, 1), (plant, 2), (loaded, 3))]
+    # It hangs a centimetre from where it is said to.
+    at = tuple(np.array([0.0, -0.005, -0.25]) - np.asarray(robot.tool_position))
+    recordings[2] = dataclasses.replace(recordings[2], payload=Payload(0.6, at))
+    config = DiagnoseConfig(effects=tuple(CATALOGUE[slug] for slug in LIBRARY))
+    result = diagnose(with_phi(robot, 0.85 * robot.phi), recordings, config)
+    assert names(result) == {("coulomb_friction", "elbow")} and not result.diagnosis.unexplained
+    drive, found = result.model.drive, result.diagnosis.findings[0].parameters["coulomb"]
+    assert drive is not None and found.value and found.std
+    np.testing.assert_allclose(drive.kp, KP, rtol=0.01)
+    assert abs(found.value - 0.25) < 0.01 and found.std < 0.01
+    assert any("By what the known payload adds to the torque, Kp is" in note for note in result.diagnosis.notes)
 
 
 @pytest.fixture(scope="module")

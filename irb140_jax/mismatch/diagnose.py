@@ -21,7 +21,7 @@ from irb140_jax.mismatch.motion import motion_unseen
 from irb140_jax.mismatch.output.document import Found, document, document_of_nothing, report_views
 from irb140_jax.mismatch.output.findings import findings, torque_scale_odds
 from irb140_jax.mismatch.output.provenance import provenance
-from irb140_jax.mismatch.output.servos import harmful_discrepancy, without_negligible
+from irb140_jax.mismatch.output.servos import by_known_payload, harmful_discrepancy, without_negligible
 from irb140_jax.mismatch.output.store import Result
 from irb140_jax.mismatch.output.views import Views
 from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
@@ -32,6 +32,7 @@ from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, re
 from irb140_jax.mismatch.validation.testable import reference, visibility
 from irb140_jax.mismatch.validation.undecided_joints import made_worse
 from irb140_jax.mismatch.validation.unexplained import unexplained
+from irb140_jax.recordings.drive import PAYLOAD
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 
@@ -121,6 +122,9 @@ def _diagnosed(
         return _nothing_compared(data, config, reason)
     sensors = scatter_by_sensor(robot, data.recordings, data.smooth, data.band)
     ex = _explained(data, sensors, config, progress)
+    if data.servo is not None and any(ex.payloads) and PAYLOAD not in data.servo.drive.said:
+        progress("once more, in torque of the Kp that the known payload shows")
+        return _diagnosed(robot, by_known_payload(ex, data.servo, recordings, data.recordings), config, progress)
     data = data.placed(ex.payloads)
     progress("proving on data that the fit did not see")
     refit = refitted(ex)

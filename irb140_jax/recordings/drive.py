@@ -17,6 +17,7 @@ COMMON_DELAY_WIDTH, LAG_WIDTH = 1e-3, 5e-3
 # s and rows by which commands of one joint may act at another time than those of all joints are found to.
 OWN_DELAY_WIDTH, ROWS_WIDTH = 1e-3, 0.1
 ARRAYS = ("kp", "kd", "limit", "low", "high", "delay", "kp_width", "kd_width")  # of a drive, one number a joint each
+PAYLOAD = "payload"  # where gains come from that a known payload shows
 SECTIONS = ("kp", "kd", "torque_limit", "command_delay")  # of the column map
 
 
@@ -47,7 +48,7 @@ class Drive:
         delay: Time after its row at which a command is taken up [s], shape (n,).
         kp_width: Relative standard deviation of kp, shape (n,).
         kd_width: Standard deviation of kd [N m s/rad or N s/m], shape (n,).
-        said: Where each joint's gains come from: "model", "map", "estimate" or "", in the order of the joints.
+        said: Where each joint's gains come from, in the order of the joints: "model", "map", "payload", "estimate", "".
         common_delay_width: Standard deviation of the delay that all share [s]; zero where it was stated.
         lag: Time by which the torque of all joints comes later than the law says [s].
     """
@@ -74,7 +75,7 @@ class Drive:
     def is_known(self) -> bool:
         """Whether the law of every servo is: gains that are stated, and no worse than stated gains are."""
         kp, kd = self.kp_width <= GAIN_WIDTH, self.kd_width <= GAIN_WIDTH * np.abs(self.kd)
-        return all(word in ("model", "map") for word in self.said) and bool(np.all(kp & kd))
+        return all(word in ("model", "map", PAYLOAD) for word in self.said) and bool(np.all(kp & kd))
 
     @property
     def phase_width(self) -> float:

@@ -15,6 +15,7 @@ from irb140_jax.mismatch.regression.servo import NAMES
 from irb140_jax.mismatch.result import Estimate, Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.recordings.condition import Commanded, Conditioned
+from irb140_jax.recordings.drive import PAYLOAD, unknown_drive
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 
@@ -133,6 +134,30 @@ def kp_scale(ex: Explanation, servo: Commanded, j: int) -> tuple[float, float]:
     own = width * (np.arange(len(ex.space.joints[j].groups)) == FIXED.index("gain"))[None]
     mean, cov = ex.space.functions(ex.chosen, ex.hyper, j, shared, own)
     return float(mean[0]), float(np.sqrt(cov[0, 0]))
+
+
+def by_known_payload(
+    ex: Explanation, servo: Commanded, given: Sequence[Recording], made: Sequence[Recording]
+) -> list[Recording]:
+    """Recordings as given, with the Kp that the known payload of some of them shows, and its doubt.
+
+    Args:
+        ex: The explanation, in torque of the Kp that was stated or estimated.
+        servo: What the servos of the recordings share.
+        given: The recordings, with their drives as stated.
+        made: The same with drives whose gains are complete.
+    """
+    n = ex.lib.robot.n
+    more, unsure = np.transpose([kp_scale(ex, servo, j) for j in range(n)])
+    out = []
+    for r, m in zip(given, made, strict=True):
+        assert m.drive is not None
+        stated = r.drive or unknown_drive(n)
+        known = np.isfinite(m.drive.kp)
+        said = tuple(PAYLOAD if one else word for one, word in zip(known, stated.said, strict=True))
+        drive = dataclasses.replace(stated, kp=m.drive.kp / (1.0 + more), kp_width=unsure, said=said)
+        out.append(dataclasses.replace(r, drive=drive))
+    return out
 
 
 def gain_notes(ex: Explanation, servo: Commanded) -> list[str]:
