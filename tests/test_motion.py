@@ -132,7 +132,7 @@ def test_friction_that_mjcf_cannot_hold_acts_where_the_motion_goes_and_other_tor
     missing = beyond_file(without_those(model), [recording], [bare])  # the sine, which the file does not hold
     made = proof_in_motion(robot, lambda _: model, [Span(0, 0, 0.0, 5.99)], [recording], missing or [])
     assert made and made["as_law"] == ["friction that differs by direction"] and not made["as_torque"]
-    assert "acted as it is where the simulated motion goes" in made["sentences"][-1]
+    assert "in the corrected model it acts at each state that the simulation reaches" in made["sentences"][-1]
     for joint in made["joints"].values():
         assert joint["corrected"]["median"][5] < 0.1 * joint["refit"]["median"][5]
     assert made["joints"]["b"]["file"]["median"][5] > 5 * made["joints"]["b"]["corrected"]["median"][5]

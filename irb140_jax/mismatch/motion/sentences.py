@@ -39,7 +39,8 @@ def sentences(proof: Mapping[str, Any]) -> list[str]:
         how = ["what it lacks was applied as a torque computed along the recorded motion, which favours the corrected "
                "model"] * bool(proof["as_torque"])  # fmt: skip
         if proof["as_law"]:
-            how.append(f"{', '.join(proof['as_law'])} acted as it is where the simulated motion goes")
+            what_acts = ", ".join(proof["as_law"]) if proof["as_torque"] else "it"
+            how.append(f"in the corrected model {what_acts} acts at each state that the simulation reaches")
         said.append(f"corrected.xml can't hold {', '.join(outside)} in whole or in part; {'; '.join(how)}. With "
                     f"the file alone {what} is off by {', '.join(alone)}.")  # fmt: skip
     return said
