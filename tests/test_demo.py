@@ -20,7 +20,8 @@ VERDICTS = {"no_mismatch", "parameters_only", "physics_left_out", "unexplained",
 @pytest.fixture(scope="module")
 def irb140():
     """The command."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    # Of recordings as long as these, compiling well saves more than it takes.
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "XLA_FLAGS": ""}
     code = "import sys; from irb140_jax.cli import main; sys.exit(main())"
 
     def run(*words) -> str:

@@ -10,7 +10,7 @@ from irb140_jax.mismatch.diagnose import diagnose as diagnose
 from irb140_jax.mismatch.experiment_design.design import Proposal as Proposal
 from irb140_jax.mismatch.experiment_design.design import propose as propose
 from irb140_jax.mismatch.experiment_design.undecided import Undecided as Undecided
-from irb140_jax.mismatch.motion.take_away import CorrectedMujoco as CorrectedMujoco
+from irb140_jax.mismatch.output.own_simulation import CorrectedMujoco as CorrectedMujoco
 from irb140_jax.mismatch.output.store import Result as Result
 from irb140_jax.mismatch.output.store import load_corrected as load_corrected
 from irb140_jax.mismatch.output.store import load_diagnosis as load_diagnosis

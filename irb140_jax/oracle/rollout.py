@@ -51,7 +51,8 @@ def positions(
     """
     n = q.shape[1]
     start = np.concatenate([np.zeros((len(q), 1)), q, qd], axis=1)  # of mjSTATE_FULLPHYSICS: time, qpos, qvel
-    state = _states(models, start, tau, control)
+    with _Threads(models[0], len(q)) as threads:
+        state = threads.states(models, start, tau, control)
     return np.concatenate([q[:, None], np.where(_ended(start, state), np.inf, state[..., 1 : 1 + n])], axis=1)
 
 
@@ -73,20 +74,21 @@ def positions_under_law(
     datas = [mujoco.MjData(m) for m in bare]
     state, went = np.concatenate([np.zeros((len(q), 1)), q, qd], axis=1), [q[:, None]]
     ended, qdd, every = np.zeros((len(q), 1), dtype=bool), np.zeros_like(q), max(round(HELD / step), 1)
-    for first in range(0, tau.shape[1], every):
-        at = slice(first, first + every)
-        load = np.stack([joint_load(m, d, s, a) for m, d, s, a in zip(bare, datas, state, qdd, strict=True)])
-        level, torque = law(state[:, 0], state[:, 1 : 1 + n], state[:, 1 + n :], load, asked[:, first])
-        for m, loss in zip(rubbing, own + level, strict=True):
-            m.dof_frictionloss[:] = loss
-        given = tau[:, at] - torque[:, None]
-        after = _states(rubbing, state, given, None if control is None else asked[:, at])
-        gone = _ended(state, after) | ended[:, None]
-        went.append(np.where(gone, np.inf, after[..., 1 : 1 + n]))
-        ended = gone[:, -1]
-        # What flew away stays where it last was, and is infinite all the same.
-        last = np.where(ended, state, after[:, -1])
-        qdd, state = (last - state)[:, 1 + n :] / (given.shape[1] * step), last
+    with _Threads(models[0], len(q)) as threads:
+        for first in range(0, tau.shape[1], every):
+            at = slice(first, first + every)
+            load = np.stack([joint_load(m, d, s, a) for m, d, s, a in zip(bare, datas, state, qdd, strict=True)])
+            level, torque = law(state[:, 0], state[:, 1 : 1 + n], state[:, 1 + n :], load, asked[:, first])
+            for m, loss in zip(rubbing, own + level, strict=True):
+                m.dof_frictionloss[:] = loss
+            given = tau[:, at] - torque[:, None]
+            after = threads.states(rubbing, state, given, None if control is None else asked[:, at])
+            gone = _ended(state, after) | ended[:, None]
+            went.append(np.where(gone, np.inf, after[..., 1 : 1 + n]))
+            ended = gone[:, -1]
+            # What flew away stays where it last was, and is infinite all the same.
+            last = np.where(ended, state, after[:, -1])
+            qdd, state = (last - state)[:, 1 + n :] / (given.shape[1] * step), last
     return np.concatenate(went, axis=1)
 
 
@@ -97,19 +99,29 @@ def joint_load(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray, qd
     return data.qfrc_inverse.copy()
 
 
-def _states(
-    models: Sequence[mujoco.MjModel], start: np.ndarray, tau: np.ndarray, control: np.ndarray | None
-) -> np.ndarray:
-    """States after each step, (B, S, 1 + 2 n): time, positions, speeds."""
-    threads = [mujoco.MjData(models[0]) for _ in range(min(len(start), os.cpu_count() or 1))]
-    mujoco.set_mju_user_warning(lambda _: None)  # or MuJoCo writes a file about motions that fly away
-    try:
+class _Threads:
+    """MuJoCo's threads for motions side by side, and what each of them writes to."""
+
+    def __init__(self, model: mujoco.MjModel, motions: int):
+        self.datas = [mujoco.MjData(model) for _ in range(min(motions, os.cpu_count() or 1))]
+        self.rollout = rollout.Rollout(nthread=len(self.datas))
+
+    def __enter__(self) -> "_Threads":
+        mujoco.set_mju_user_warning(lambda _: None)  # or MuJoCo writes a file about motions that fly away
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        mujoco.set_mju_user_warning(None)
+        self.rollout.close()
+
+    def states(
+        self, models: Sequence[mujoco.MjModel], start: np.ndarray, tau: np.ndarray, control: np.ndarray | None
+    ) -> np.ndarray:
+        """States after each step, (B, S, 1 + 2 n): time, positions, speeds."""
         spec, given = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), np.ascontiguousarray(tau)
         if control is not None:  # comes first in MuJoCo's order
             spec, given = spec | int(mujoco.mjtState.mjSTATE_CTRL), np.concatenate([control, tau], axis=-1)
-        return rollout.rollout(list(models), threads, start, given, control_spec=spec)[0]
-    finally:
-        mujoco.set_mju_user_warning(None)
+        return self.rollout.rollout(list(models), self.datas, start, given, control_spec=spec)[0]
 
 
 def _ended(start: np.ndarray, state: np.ndarray) -> np.ndarray:
