@@ -20,7 +20,7 @@ from scipy import signal
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.mismatch import Result, diagnose, predict
-from irb140_jax.mismatch.motion.models import compiled_robot, moved, simulated
+from irb140_jax.mismatch.motion.models import compiled_robot, positions_of, simulated
 from irb140_jax.recordings import Recording
 from irb140_jax.recordings.drive import ARRAYS, Drive
 from irb140_jax.recordings.machines import (
@@ -76,7 +76,7 @@ def off(result: Result, runs: Sequence[Recording]) -> dict[str, list[np.ndarray]
         asked = np.stack([np.interp(times, run.t, x) for x in taken_up(run, drive).T], axis=1)[None]
         for name, apart in out.items():
             start, still, began = run.q[:1], np.zeros_like(run.q[:1]), np.zeros(1)
-            went = moved([models], name, [drive], start, still, np.zeros_like(asked), asked, began)[0, :-1]
+            went = positions_of([models], name, [drive], start, still, np.zeros_like(asked), asked, began)[0, :-1]
             apart.append(run.q - np.stack([np.interp(run.t, times, x) for x in went.T], axis=1))
     return out
 

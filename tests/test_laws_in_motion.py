@@ -12,7 +12,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.columns.torques import Named
 from irb140_jax.mismatch.corrected.model import CorrectedModel, to_json
 from irb140_jax.mismatch.motion.laws import law_of, without_those
-from irb140_jax.mismatch.motion.models import FILE, compiled_robot, moved, simulated
+from irb140_jax.mismatch.motion.models import FILE, compiled_robot, positions_of, simulated
 from irb140_jax.oracle.rollout import positions_under_law, simulated_model
 from irb140_jax.recordings.drive import stated_drive
 from irb140_jax.recordings.low_pass import Band
@@ -97,8 +97,8 @@ def test_a_users_own_simulation_goes_where_the_proof_in_motion_goes(tmp_path):
     made = simulated(model, compiled_robot(robot, STEP), STEP)
     assert made is not None
     still = np.zeros((1, n))
-    ours = {name: moved([made], name, [drive], still, still, np.zeros((1, *control.shape)), control[None], np.zeros(1))
-            for name in ("corrected", FILE)}  # fmt: skip
+    given = np.zeros((1, *control.shape)), control[None], np.zeros(1)
+    ours = {name: positions_of([made], name, [drive], still, still, *given) for name in ("corrected", FILE)}
     taken = CorrectedMujoco(tmp_path)
     taken.model.opt.timestep, taken.model.opt.integrator = STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     taken.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)

@@ -66,10 +66,8 @@ def positions_under_law(
 ) -> Float[np.ndarray, "B S+1 n"]:
     """The same under a law beside the models' own numbers; what it gives is held for `HELD` each time."""
     n, step = q.shape[1], models[0].opt.timestep
-    rubbing, bare = ([copy.copy(m) for m in models] for _ in range(2))
+    rubbing, bare = [copy.copy(m) for m in models], [frictionless(m) for m in models]
     own = np.stack([m.dof_frictionloss for m in models])
-    for m in bare:
-        m.dof_frictionloss[:] = m.dof_damping[:] = 0.0
     asked = np.zeros(tau.shape) if control is None else control
     datas = [mujoco.MjData(m) for m in bare]
     state, went = np.concatenate([np.zeros((len(q), 1)), q, qd], axis=1), [q[:, None]]
@@ -92,8 +90,15 @@ def positions_under_law(
     return np.concatenate(went, axis=1)
 
 
+def frictionless(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy of a model whose inverse dynamics is the load of its joints."""
+    out = copy.copy(model)
+    out.dof_frictionloss[:] = out.dof_damping[:] = 0.0
+    return out
+
+
 def joint_load(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """What the joints need without friction in a state (1 + 2 n,): time, positions, speeds, shape (n,) [N m or N]."""
+    """What the joints of a frictionless model need in a state (1 + 2 n,): time, positions, speeds, (n,) [N m or N]."""
     data.qpos[:], data.qvel[:], data.qacc[:] = state[1 : 1 + model.nq], state[1 + model.nq :], qdd
     mujoco.mj_inverse(model, data)
     return data.qfrc_inverse.copy()

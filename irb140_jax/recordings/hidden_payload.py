@@ -18,7 +18,7 @@ def explained_by_a_payload(doubt: Doubt, seen: Glance, robot: Robot, model: Torq
     """Whether a payload explains the torque as well as a mended channel does.
 
     Args:
-        doubt: What is taken for wrong; never explained if it is not the explained torque that speaks for it.
+        doubt: What is taken for wrong; where its `explained` is None, such as for units, no payload is asked for.
         seen: A quick look at the recording.
         robot: The nominal model.
         model: Its torque.
@@ -40,17 +40,17 @@ def _explained_with_payload(seen: Glance, robot: Robot, model: Torques, judged: 
     joints, n = np.flatnonzero(judged), robot.n
     sizes = np.maximum(np.std(seen.tau, axis=0), 1e-9)
     centred = lambda x: (x - x.mean(axis=0)) / sizes  # noqa: E731
-    target, own = centred(seen.tau), len(joints)
+    target, count = centred(seen.tau), len(joints)
     out = []
     for link in sorted(set(range(n)) - set(robot.parent)):
         loaded = [with_phi(robot, robot.phi.at[link, k].add(1.0)) for k in range(4)]
         mass, *moments = (centred(nominal_torques(x, seen.q, seen.qd, seen.qdd).total - model.total) for x in loaded)
         shared = np.stack([mass, *moments, *(-x for x in moments)], axis=-1)[:, joints]
-        rows = np.zeros((own, len(target), 3 * own + shared.shape[-1]))
+        rows = np.zeros((count, len(target), 3 * count + shared.shape[-1]))
         for i, j in enumerate(joints):
             features = terms(seen.qd[:, j], model.total[:, j])
             rows[i, :, 3 * i : 3 * i + 3] = (features - features.mean(axis=0)) / sizes[j]
-            rows[i, :, 3 * own :] = shared[:, i]
+            rows[i, :, 3 * count :] = shared[:, i]
         flat = rows.reshape(-1, rows.shape[-1])
         # Solved in the few dimensions that the columns span, not in all samples.
         Q, R = np.linalg.qr(flat)

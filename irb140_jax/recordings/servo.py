@@ -127,17 +127,13 @@ def _gain_notes(
         if len(own):
             out.append(f"{head}, by {words}: Kp and Kd of {gains(own)}. Each Kp is taken to be right to "
                        f"{100 * first.kp_width[own].max():.2g} %, and a stated Kd to {100 * GAIN_WIDTH:.2g} %")
-    unit = lambda j: "N/m" if robot.is_slide[j] else "N m/rad"  # noqa: E731
     if len(shown := np.flatnonzero(said == PAYLOAD)):
-        each = ", ".join(f"{first.kp[j]:.4g} +- {first.kp[j] * first.kp_width[j]:.1g} {unit(j)} on {names[j]}"
-                         for j in shown)  # fmt: skip
-        out.append(f"{head}. By what the known payload adds to the torque, Kp is {each}{also}: torque and friction are "
-                   "in units of that")  # fmt: skip
+        out.append(f"{head}, by the Kp that the known payload shows: Kp and Kd of {gains(shown)}")
     guessed = np.flatnonzero(said == "estimate")
     if len(guessed):
         each = ", ".join(
             f"{estimates[int(j)].kp:.3g} +- {estimates[int(j)].kp * estimates[int(j)].spread:.2g} "
-            f"{unit(j)} on {names[j]}" for j in guessed
+            f"{'N/m' if robot.is_slide[j] else 'N m/rad'} on {names[j]}" for j in guessed
         )  # fmt: skip
         out.append(
             f"{head}. No Kp is stated; by the model's nominal inertials it is {each}, of which "

@@ -19,7 +19,7 @@ from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.testable import Reference, Seen
 from irb140_jax.recordings.low_pass import Band
 
-FILE, SCHEMA = "undecided.npz", 1
+FILE, SCHEMA = "undecided.npz", 2
 Sets = tuple[tuple[int, ...], ...]
 
 

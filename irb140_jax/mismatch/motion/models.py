@@ -97,7 +97,7 @@ def simulated(model: CorrectedModel, nominal: mujoco.MjModel, step: float) -> Si
     return Simulated(model, compiled, np.asarray(file.gear) / np.asarray(model.robot.gear))
 
 
-def moved(
+def positions_of(
     models: Sequence[Simulated], name: str, drives: Sequence[Drive | None], start: np.ndarray, speed: np.ndarray,
     tau: np.ndarray, control: np.ndarray, began: np.ndarray,
 ) -> np.ndarray:  # fmt: skip

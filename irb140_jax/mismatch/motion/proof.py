@@ -8,7 +8,16 @@ import numpy as np
 
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.motion.laws import beyond_numbers
-from irb140_jax.mismatch.motion.models import FILE, Simulated, asked, compiled_robot, leading, led, moved, simulated
+from irb140_jax.mismatch.motion.models import (
+    FILE,
+    Simulated,
+    asked,
+    compiled_robot,
+    leading,
+    led,
+    positions_of,
+    simulated,
+)
 from irb140_jax.mismatch.motion.sentences import MODELS, sentences, subject
 from irb140_jax.mismatch.motion.windows import FINEST, FINEST_SERVO, LONGEST, Span, Window, windows
 from irb140_jax.oracle.rollout import tool_positions
@@ -111,7 +120,7 @@ def _errors(
     for name in names:
         for b, w in enumerate(cut):
             tau[b, : len(fine[b])] = _between(applied(name, w), fine[b])
-        own = moved(of_windows, name, servos, start, speed, tau, control, began)[:, ::parts]
+        own = positions_of(of_windows, name, servos, start, speed, tau, control, began)[:, ::parts]
         for k, w in enumerate(cut):
             r = recordings[w.recording]
             rows = np.round(times / (r.t[1] - r.t[0])).astype(int)

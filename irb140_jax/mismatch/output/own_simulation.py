@@ -1,6 +1,5 @@
 """The corrected model for a MuJoCo simulation of the user's own, laws included that MJCF has no numbers for."""
 
-import copy
 import pathlib
 from collections.abc import Sequence
 
@@ -11,7 +10,7 @@ from irb140_jax.effects import Effect
 from irb140_jax.mismatch.corrected.native import native_mjcf, native_robot
 from irb140_jax.mismatch.motion.laws import law_of, without_those
 from irb140_jax.mismatch.output.store import load_model
-from irb140_jax.oracle.rollout import joint_load
+from irb140_jax.oracle.rollout import frictionless, joint_load
 
 
 class CorrectedMujoco:
@@ -36,8 +35,7 @@ class CorrectedMujoco:
         self.model = mujoco.MjModel.from_xml_string(native_mjcf(bare))
         gear = np.asarray(native_robot(bare).gear) / np.asarray(corrected.robot.gear)
         self._law = law_of([corrected], [corrected.drive], [gear], np.zeros(1))
-        self._own, self._bare = self.model.dof_frictionloss.copy(), copy.copy(self.model)
-        self._bare.dof_frictionloss[:] = self._bare.dof_damping[:] = 0.0
+        self._own, self._bare = self.model.dof_frictionloss.copy(), frictionless(self.model)
         self._inverse = mujoco.MjData(self._bare)
         self._servos = corrected.drive is not None
 

@@ -139,7 +139,9 @@ def kp_scale(ex: Explanation, servo: Commanded, j: int) -> tuple[float, float]:
 def by_known_payload(
     ex: Explanation, servo: Commanded, given: Sequence[Recording], made: Sequence[Recording]
 ) -> list[Recording]:
-    """Recordings as given, with the Kp that the known payload of some of them shows, and its doubt.
+    """Recordings as given, with the Kp that the known payload of some of them shows.
+
+    As uncertain beforehand as it was: the same recordings are to tell its doubt, once.
 
     Args:
         ex: The explanation, in torque of the Kp that was stated or estimated.
@@ -147,21 +149,28 @@ def by_known_payload(
         given: The recordings, with their drives as stated.
         made: The same with drives whose gains are complete.
     """
-    n = ex.lib.robot.n
-    more, unsure = np.transpose([kp_scale(ex, servo, j) for j in range(n)])
-    out = []
+    n, out = ex.lib.robot.n, []
+    more = np.array([kp_scale(ex, servo, j)[0] for j in range(n)])
     for r, m in zip(given, made, strict=True):
         assert m.drive is not None
         stated = r.drive or unknown_drive(n)
         known = np.isfinite(m.drive.kp)
         said = tuple(PAYLOAD if one else word for one, word in zip(known, stated.said, strict=True))
-        drive = dataclasses.replace(stated, kp=m.drive.kp / (1.0 + more), kp_width=unsure, said=said)
+        drive = dataclasses.replace(stated, kp=m.drive.kp / (1.0 + more), kp_width=m.drive.kp_width, said=said)
         out.append(dataclasses.replace(r, drive=drive))
     return out
 
 
 def gain_notes(ex: Explanation, servo: Commanded) -> list[str]:
-    """What the masses of the model say of the gains."""
+    """What the masses of the model, or a known payload, say of the gains."""
+    shown = [j for j, said in enumerate(servo.drive.said) if said == PAYLOAD]
+    if shown:
+        each = []
+        for j in shown:
+            more, unsure = kp_scale(ex, servo, j)
+            kp, unit = servo.drive.kp[j] / (1.0 + more), "N/m" if ex.lib.robot.is_slide[j] else "N m/rad"
+            each.append(f"{digits(kp, 4)} +- {digits(kp * unsure, 1)} {unit} on {ex.lib.robot.joint_names[j]}")
+        return [f"By what the known payload adds to the torque, Kp is {', '.join(each)}."]
     known = [j for j, said in enumerate(servo.drive.said) if said in ("model", "map")]
     if not known:
         return []
