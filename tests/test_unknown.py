@@ -18,7 +18,7 @@ SHARE = 0.15  # of the joint's torque
 
 def test_a_rotors_gyroscope_is_located_by_joint_and_variables_and_not_named():
     robot = irb140()
-    motions = three_motions(robot, 15.0, 500.0, seed=1)
+    motions = three_motions(robot, 8.0, 500.0, seed=1)
     case = conceal(str(irb140_path()), [Concealment("rotor_gyroscope", ("joint2",), SHARE)], motions, seed=2)
     diagnosis = diagnose(robot, case.recordings).diagnosis.to_json()
     assert not diagnosis["findings"] and diagnosis["verdict"] == "unexplained"
@@ -31,7 +31,7 @@ def test_what_goes_with_time_counts_where_a_slow_sweep_makes_position_go_with_ti
     """Copies of the residual, shifted in time, are as predictable by position there: it is no surer than chance."""
     xml = random_robot(100, 1)
     robot = robot_from_model(arm_spec(xml).compile(), source="random robot")
-    motions = three_motions(robot, 15.0, 500.0, seed=113)
+    motions = three_motions(robot, 8.0, 500.0, seed=113)
     case = conceal(xml, [Concealment("back_emf_sag", ("joint1",), SHARE)], motions, seed=2)
     diagnosis = diagnose(robot, case.recordings).diagnosis.to_json()
     assert diagnosis["findings"] == []
@@ -53,7 +53,7 @@ def test_a_damper_between_joints_is_no_viscous_friction():
 
 def test_viscous_friction_stays_beside_friction_that_grows_with_load_where_more_is_left():
     robot, joint = irb140(), ("joint2",)
-    motions = three_motions(robot, 15.0, 500.0, seed=1)
+    motions = three_motions(robot, 8.0, 500.0, seed=1)
     hidden = {"load_dependent_friction": SHARE, "viscous_friction": 0.06, "cross_damping": SHARE}
     case = conceal(str(irb140_path()), [Concealment(e, joint, share) for e, share in hidden.items()], motions, seed=2)
     diagnosis = diagnose(robot, case.recordings).diagnosis.to_json()
