@@ -31,7 +31,7 @@ def test_what_goes_with_time_counts_where_a_slow_sweep_makes_position_go_with_ti
     """Copies of the residual, shifted in time, are as predictable by position there: it is no surer than chance."""
     xml = random_robot(100, 1)
     robot = robot_from_model(arm_spec(xml).compile(), source="random robot")
-    motions = three_motions(robot, 8.0, 500.0, seed=113)
+    motions = three_motions(robot, 15.0, 500.0, seed=113)
     case = conceal(xml, [Concealment("back_emf_sag", ("joint1",), SHARE)], motions, seed=2)
     diagnosis = diagnose(robot, case.recordings).diagnosis.to_json()
     assert diagnosis["findings"] == []
