@@ -60,12 +60,21 @@ def planted(seed: int, amplitudes: dict[int, float]) -> tuple[Space, list[dict[s
     return space, data
 
 
+def with_payload(space: Space) -> Space:
+    """The same space, whose first candidate is a payload that moves both joints."""
+    payload = Candidate(CATALOGUE["payload"], (0, 1), np.zeros(0), np.array([0, 4]), (0, 1), np.zeros(2), np.ones(2))
+    free = np.full((len(space.candidates), 2), np.inf)
+    return dataclasses.replace(
+        space, candidates=(payload, *space.candidates[1:]), lowest=-free, highest=free, weights=np.zeros_like(free)
+    )
+
+
 def density(
-    space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], hyper, width: float
+    space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], hyper, width: float, tied: float = 1.0
 ) -> float:
     """Log density of both joints' torque with every unknown integrated out by its covariance: no Gram matrices.
 
-    The inertials' prior is as many times as wide as stated as `width` says.
+    The inertials' prior is as many times as wide as stated as `width` says, a payload's as `tied` does.
     """
     columns = space.set_columns(chosen)
     shared, blocks = [], []
@@ -73,6 +82,8 @@ def density(
         wide = np.zeros((ROWS, space.size))
         wide[:, d["mine"]] = d["X"]
         wide[:, :INERTIALS] *= width
+        for c in (space.candidates[i] for i in chosen if space.candidates[i].slug == "payload"):
+            wide[:, c.columns + space.offset] *= tied
         shared.append(wide[:, columns])
         E = d["E"] * own_scale(GROUPS, of_joint)
         blocks.append(E @ E.T + LEVELS[of_joint[-1]] ** 2 * np.eye(ROWS))
@@ -84,6 +95,19 @@ def density(
     mean = Z[:, INERTIALS : INERTIALS + COMMON] @ space.centre
     density = stats.multivariate_normal(mean, cov)  # pyright: ignore[reportArgumentType]: stubs want a number
     return float(density.logpdf(y)) + 0.5 * len(y) * np.log(2.0 * np.pi)
+
+
+def dense_posterior(space: Space, data, chosen: tuple[int, ...], hyper, prior: np.ndarray):
+    """Mean and covariance of a set's columns under these prior standard deviations, without Gram matrices."""
+    columns, precision, moment = space.set_columns(chosen), np.diag(1.0 / prior**2), 0.0
+    for d, of_joint in zip(data, hyper, strict=True):
+        wide = np.zeros((ROWS, space.size))
+        wide[:, d["mine"]] = d["X"]
+        E = d["E"] * own_scale(GROUPS, of_joint)
+        inverse = np.linalg.inv(E @ E.T + LEVELS[of_joint[-1]] ** 2 * np.eye(ROWS))
+        precision = precision + wide[:, columns].T @ inverse @ wide[:, columns]
+        moment = moment + wide[:, columns].T @ inverse @ d["y"]
+    return np.linalg.solve(precision, moment), np.linalg.inv(precision)
 
 
 @pytest.mark.parametrize("centre", [0.0, 1.3])
@@ -107,6 +131,39 @@ def test_screening_says_what_the_evidence_says_at_the_width_of_the_inertials_of_
     before = density(space, data, (2,), hyper, width)
     expected = [density(space, data, (2, int(i)), hyper, width) - before + np.log(0.05) for i in which]
     np.testing.assert_allclose(gains(space, (2,), hyper, which), expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("mass", [0.02, 6.0])
+def test_a_payload_is_as_probable_as_its_data_over_all_widths_of_its_prior_with_no_mass_below_zero(mass):
+    space, data = planted(2, {0: mass, 4: -0.7 * mass})
+    space, hyper, chosen = with_payload(space), (SETTING, SETTING), (0, 2)
+    each = np.array([[density(space, data, chosen, hyper, w, t) for t in WIDTHS] for w in WIDTHS])
+    each += LOG_PRIOR[:, None] + LOG_PRIOR
+    of_inertials, of_payload = (WIDTHS[k] for k in np.unravel_index(np.argmax(each), each.shape))
+    prior = np.r_[np.full(INERTIALS, of_inertials), np.ones(COMMON), of_payload, of_payload, 1.0]
+    np.testing.assert_array_equal(space.prior(chosen, hyper), prior)
+    first = INERTIALS + COMMON
+    mean, cov = dense_posterior(space, data, chosen, hyper, prior)
+    above = np.log(2.0 * stats.norm.cdf(mean[first], 0.0, np.sqrt(cov[first, first])))
+    constant = sum(log_prior_of_sizes()[list(own[:-1])].sum() for own in hyper)
+    evidence = np.logaddexp.reduce(each, axis=None) + above + constant + 2.0 * np.log(0.05)
+    assert space.log_evidence(chosen, hyper) == pytest.approx(evidence, abs=1e-8)
+    if mass < 1.0:  # a large one widens its prior
+        drawn = np.random.default_rng(0).multivariate_normal(mean, cov, 400_000)
+        drawn = drawn[drawn[:, first] > 0.0]
+        found, spread = space.posterior(chosen, hyper)
+        scale = np.sqrt(np.diag(cov))
+        np.testing.assert_allclose(found / scale, drawn.mean(axis=0) / scale, atol=0.01)
+        np.testing.assert_allclose(spread / np.outer(scale, scale), np.cov(drawn.T) / np.outer(scale, scale), atol=0.01)
+
+
+def test_screening_says_of_a_payload_what_the_evidence_says_at_the_width_of_the_inertials_of_the_set_before():
+    space, data = planted(2, {0: 3.0, 4: -2.0})
+    space, hyper = with_payload(space), (SETTING, SETTING)
+    width = space.width((2,), hyper)
+    each = np.array([density(space, data, (2, 0), hyper, width, t) for t in WIDTHS]) + LOG_PRIOR
+    expected = np.logaddexp.reduce(each) - density(space, data, (2,), hyper, width) + np.log(0.05) + np.log(2.0)
+    np.testing.assert_allclose(gains(space, (2,), hyper, np.array([0])), expected, atol=1e-6)
 
 
 def test_a_row_in_which_a_candidate_says_nothing_has_a_density_of_one_over_its_range():
@@ -189,16 +246,9 @@ def test_the_posterior_is_that_of_the_data():
     hyper, chosen = (SETTING, (2, 0, 0, ONE + 3)), (1, 4)
     mean, cov = space.posterior(chosen, hyper)
     width = np.where(np.arange(INERTIALS + COMMON + 2) < INERTIALS, space.width(chosen, hyper), 1.0)
-    columns, precision, moment = space.set_columns(chosen), np.diag(1.0 / width**2), 0.0
-    for d, of_joint in zip(data, hyper, strict=True):
-        wide = np.zeros((ROWS, space.size))
-        wide[:, d["mine"]] = d["X"]
-        E = d["E"] * own_scale(GROUPS, of_joint)
-        inverse = np.linalg.inv(E @ E.T + LEVELS[of_joint[-1]] ** 2 * np.eye(ROWS))
-        precision = precision + wide[:, columns].T @ inverse @ wide[:, columns]
-        moment = moment + wide[:, columns].T @ inverse @ d["y"]
-    np.testing.assert_allclose(cov, np.linalg.inv(precision), atol=1e-10)
-    np.testing.assert_allclose(mean, np.linalg.solve(precision, moment), atol=1e-10)
+    expected, spread = dense_posterior(space, data, chosen, hyper, width)
+    np.testing.assert_allclose(cov, spread, atol=1e-10)
+    np.testing.assert_allclose(mean, expected, atol=1e-10)
 
 
 @pytest.mark.parametrize("silent", [0.0, 60.0])

@@ -35,6 +35,7 @@ EFFECT = Effect(
         columns=_columns,
         variants=((0, 1),),
         contains=("coulomb_friction",),
+        empirical=True,
     ),
     place=Place(At.FRICTION),
     prior=Prior(lowest=("frictionloss", "frictionloss"), dissipative=True),

@@ -34,6 +34,7 @@ EFFECT = Effect(
         variants=((0, 1),),
         own=(0,),
         contains=("torque_offset",),
+        empirical=True,
     ),
     prior=Prior(lowest=("stiffness", -np.inf)),  # no spring pushes away from its rest
     export=Export(

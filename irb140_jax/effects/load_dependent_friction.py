@@ -35,6 +35,7 @@ EFFECT = Effect(
         from_physical=lambda values: (np.array([values["coulomb"], values["load_coefficient"]]), np.zeros(0)),
         variants=((0, 1), (1,)),  # some gears rub next to nothing without load
         contains=("coulomb_friction",),
+        empirical=True,
     ),
     place=Place(At.FRICTION),
     prior=Prior(lowest=("frictionloss", 0.0), dissipative=True),

@@ -52,6 +52,7 @@ EFFECT = Effect(
         from_physical=lambda values: (np.array([values["coefficient"]]), np.array([values["exponent"]])),
         contains=("viscous_friction",),
         absorbs=False,  # k |qd|^a + d qd has no exponent of its own
+        empirical=True,
     ),
     place=Place(At.FRICTION),
     prior=Prior(lowest=(0.0,), dissipative=True),

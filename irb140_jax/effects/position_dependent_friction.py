@@ -88,6 +88,7 @@ EFFECT = Effect(
         from_physical=_from_physical,
         variants=((0, 1),),
         contains=("coulomb_friction",),
+        empirical=True,
     ),
     place=Place(At.FRICTION),
     prior=Prior(lowest=("frictionloss", -np.inf), adds_up=True, dissipative=True),

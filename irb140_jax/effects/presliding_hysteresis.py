@@ -61,6 +61,7 @@ EFFECT = Effect(
         from_physical=_from_physical,
         contains=("coulomb_friction",),
         absorbs=False,  # what slips at once beside what is springy first is neither alone
+        empirical=True,
     ),
     place=Place(At.FRICTION),
     prior=Prior(lowest=(0.0,)),

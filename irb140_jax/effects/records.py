@@ -49,6 +49,7 @@ class Law:
         own: The columns that make it what it is; the others, if any, belong to a special case or refine it.
         contains: Slugs of laws that are special cases of this one: they compete.
         falls: Whether its name is that of any friction that falls as the speed rises, whatever the form of the fall.
+        empirical: Whether its form is one of several in use for the same thing, so that it is usually a little wrong.
         absorbs: Whether the law and a special case side by side are again the law, so that they never stand so.
         silent: Of a law of servos: from what one is asked for, its speed (T, 1) and shape (s,) to where that may be
             anything beside the torque given, (T, 1), and how much torque that is: a range.
@@ -66,6 +67,7 @@ class Law:
     own: tuple[int, ...] = (-1,)
     contains: tuple[str, ...] = ()
     falls: bool = False
+    empirical: bool = False
     absorbs: bool = True
     silent: Callable[[Asked, np.ndarray, np.ndarray], tuple[np.ndarray, float]] | None = None
     to_log: Callable[[np.ndarray, float, np.ndarray, np.ndarray], np.ndarray] | None = None
@@ -162,7 +164,8 @@ class Prior:
         at_shape: From a shape (s,) to the smallest and the largest amplitude (k,) with which that shape means anything;
             others belong to other shapes of the grid.
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
-        tied: Its amplitudes are of one order of size: what the data can't see of one, the others bound.
+        tied: Its amplitudes are of one order of size, which is not known: what the data can't see of one, the others
+            bound.  The first is a mass, not below zero.
         vector: Its amplitudes are components of one vector: what the data can't see of it may be larger than the rest.
         proportion: In which its own columns act; none where all are alike.
         dissipative: It can only take energy out of the arm, at every instant.

@@ -51,6 +51,7 @@ EFFECT = Effect(
         variants=((0, 1),),
         contains=("coulomb_friction",),
         falls=True,
+        empirical=True,
     ),
     place=Place(At.FRICTION),
     prior=Prior(lowest=("frictionloss", 0.0), dissipative=True),

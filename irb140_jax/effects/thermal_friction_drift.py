@@ -54,6 +54,7 @@ EFFECT = Effect(
         from_physical=_from_physical,
         variants=((0, 1),),
         contains=("viscous_friction",),
+        empirical=True,
     ),
     place=Place(At.FRICTION),
     prior=Prior(lowest=(0.0, 0.0), dissipative=True),

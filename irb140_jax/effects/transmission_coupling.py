@@ -44,6 +44,7 @@ EFFECT = Effect(
         columns=_columns,
         from_physical=_from_physical,
         variants=((0,), (0, 1)),
+        empirical=True,
     ),
     place=Place(At.FRICTION, _sites),
     prior=Prior(lowest=(0.0, 0.0), dissipative=True),

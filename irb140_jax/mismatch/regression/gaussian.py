@@ -136,7 +136,7 @@ def posterior(
         mean = cov @ b
         last, width = width, prior.copy()
         for part in named:
-            width[part] = max(1.0, float(np.max(np.abs(mean[part]))))
+            width[part] = np.maximum(prior[part], float(np.max(np.abs(mean[part]))))
         if np.allclose(width, last, rtol=0.01):
             break
     return Posterior(columns, mean, cov)

@@ -17,7 +17,7 @@ from irb140_jax.mismatch.selection.kinds import Kinds
 
 Hyper = tuple[JointHyper, ...]  # hyperparameters, one a joint
 DRY = "coulomb_friction"
-WIDTHS = 2.0**settings.WIDTH_OCTAVES  # true over stated error of the inertials
+WIDTHS = 2.0**settings.WIDTH_OCTAVES  # of a prior over the one that was stated: of the inertials' or of a payload's
 _FALL = -np.log1p(settings.WIDTH_OCTAVES**2)
 LOG_PRIOR = _FALL - special.logsumexp(_FALL)  # a Cauchy distribution over octaves, cut off
 
@@ -162,40 +162,68 @@ class Space:
         if self._impossible(chosen, H, self.prior(chosen, hyper)):
             return -np.inf
         known = self.constant(hyper) + self._prior(chosen) - float(self.lost(chosen, hyper).sum())
-        return known + float(np.logaddexp.reduce(by_width))
+        return known + float(np.logaddexp.reduce(by_width, axis=None)) + self._of_truncated(chosen, H, hyper)
+
+    def _of_truncated(self, chosen: Sequence[int], H: np.ndarray, hyper: Hyper) -> float:
+        """What it adds to the log evidence that the first of tied columns, a mass, is not below zero."""
+        if not (at := self._first_tied(chosen)).size:
+            return 0.0
+        prior = self.prior(chosen, hyper)
+        chol = root(with_prior(H[:-1, :-1] * np.outer(prior, prior)))
+        cov = linalg.cho_solve((chol, True), np.eye(len(prior))[:, at])
+        return float(np.sum(above_zero(cov.T @ (prior * H[:-1, -1]), np.sqrt(np.diag(cov[at])))))
 
     def _by_width(self, chosen: Sequence[int], hyper: Hyper) -> tuple[np.ndarray, np.ndarray]:
-        """Gram matrix of a set's columns and y, and log evidence and prior at each width of the inertials' prior."""
+        """Gram matrix of a set's columns and y, and log evidence and prior by `_width_evidences`."""
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(hyper, every, every)
-        by_width = _width_evidences(H, self.inertials)
-        self._widths[tuple(sorted(chosen)), hyper] = float(WIDTHS[np.argmax(by_width)])
+        by_width = _width_evidences(H, self.inertials, self._tied(chosen))
+        best = np.unravel_index(np.argmax(by_width), by_width.shape)
+        self._widths[tuple(sorted(chosen)), hyper] = float(WIDTHS[best[0]]), float(WIDTHS[best[1]])
         return H, by_width
+
+    def _tied(self, chosen: Sequence[int]) -> np.ndarray:
+        """Which of a set's columns have one prior whose width is not known, shape (k,)."""
+        of_members = [np.full(len(self.columns[c]), self.candidates[c].effect.prior.tied) for c in chosen]
+        return np.concatenate([np.zeros(self.offset, dtype=bool), *of_members])
+
+    def _first_tied(self, chosen: Sequence[int]) -> np.ndarray:
+        """Where a set's columns have the first of each member's tied ones."""
+        tied = self._tied(chosen)
+        starts = self.offset + np.cumsum([0, *(len(self.columns[c]) for c in chosen)], dtype=int)[:-1]
+        return np.array([s for s in starts if tied[s]], dtype=int)
 
     def width(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """True over stated error of the inertials that is most probable beside a set."""
+        return self._most_probable_widths(chosen, hyper)[0]
+
+    def _most_probable_widths(self, chosen: Sequence[int], hyper: Hyper) -> tuple[float, float]:
+        """Widths of the inertials' prior and of the set's tied columns, over those stated."""
         key = tuple(sorted(chosen)), hyper
         if key not in self._widths:
             self._by_width(chosen, hyper)
         return self._widths[key]
 
     @cached_property
-    def _widths(self) -> dict[tuple, float]:
+    def _widths(self) -> dict[tuple, tuple[float, float]]:
         return {}
 
     def prior(self, chosen: Sequence[int], hyper: Hyper) -> np.ndarray:
         """Prior standard deviations of a set's columns, in units of those that were stated."""
-        out = np.ones(self.offset + sum(len(self.columns[c]) for c in chosen))
-        out[: self.inertials] = self.width(chosen, hyper)
+        of_inertials, of_tied = self._most_probable_widths(chosen, hyper)
+        out = np.where(self._tied(chosen), of_tied, 1.0)
+        out[: self.inertials] = of_inertials
         return out
 
     def torque_scale_odds(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """Log evidence for one scale of all torques, the first of the common nuisances, over that of none."""
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(hyper, every, every)
+        tied = self._tied(chosen)
         without = np.delete(np.delete(H, self.inertials, axis=0), self.inertials, axis=1)
-        free, none = (float(np.logaddexp.reduce(_width_evidences(x, self.inertials))) for x in (H, without))
-        return free - none
+        free = _width_evidences(H, self.inertials, tied)
+        none = _width_evidences(without, self.inertials, np.delete(tied, self.inertials))
+        return float(np.logaddexp.reduce(free, axis=None) - np.logaddexp.reduce(none, axis=None))
 
     def lost(self, which: Sequence[int] | np.ndarray, hyper: Hyper) -> np.ndarray:
         """Log density of what is logged that candidates lose where they say nothing of it, shape (len(which),)."""
@@ -234,6 +262,8 @@ class Space:
         found = posterior(np.pad(H[np.ix_(at, at)], (0, 1)) + np.pad(H[at, -1:], ((0, 1), (len(at), 0))),
                           np.arange(len(at)), named, self.prior(chosen, hyper)[at])  # fmt: skip
         mean[at], cov[np.ix_(at, at)] = found.mean, found.cov
+        for first in self._first_tied(chosen):
+            mean, cov = truncated(mean, cov, int(first))
         return mean, cov
 
     def own(
@@ -302,28 +332,61 @@ class Space:
     def outside(self, which: np.ndarray, mean: np.ndarray) -> np.ndarray:
         """Which candidates' amplitudes (candidates, k) are inadmissible."""
         k = mean.shape[1]
-        bad = np.any((mean < self.lowest[which, :k] - 1e-9) | (mean > self.highest[which, :k] + 1e-9), axis=1)
+        # Tied ones may seem impossible by what is not known of them: their bound is in the evidence.
+        free = np.array([self.candidates[i].effect.prior.tied for i in which], dtype=bool)
+        bad = np.any((mean < self.lowest[which, :k] - 1e-9) | (mean > self.highest[which, :k] + 1e-9), axis=1) & ~free
         return bad | (np.sum(mean * self.weights[which, :k], axis=1) < self.least[which])
 
 
-def _width_evidences(H: np.ndarray, inertials: int) -> np.ndarray:
-    """Log evidence and prior of each width of the inertials' prior, which come first in a Gram matrix, (WIDTHS,)."""
-    prior = np.ones((len(WIDTHS), len(H) - 1))
-    prior[:, :inertials] = WIDTHS[:, None]
-    return _log_evidences(np.repeat(H[None], len(WIDTHS), axis=0), prior) + LOG_PRIOR
+def above_zero(mean: np.ndarray, std: np.ndarray) -> np.ndarray:
+    """Log of the probability that what is not below zero a priori isn't so by the data, over the prior's half."""
+    return special.log_ndtr(mean / std) + np.log(2.0)
 
 
-def _log_evidences(H: np.ndarray, prior: np.ndarray) -> np.ndarray:
-    """Log evidence of amplitudes from Gram matrices (b, k + 1, k + 1) whose last column is y, (b,).
+def truncated(mean: np.ndarray, cov: np.ndarray, at: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and covariance of a Gaussian where one of its variables is not below zero.
 
-    The last pivot of a Cholesky factor that has y in it is what is left of y.
+    Source: Johnson, Kotz, Balakrishnan, Continuous Univariate Distributions 1, 1994, sec. 13.10.1.
+    """
+    std = float(np.sqrt(cov[at, at]))
+    z = mean[at] / std
+    ratio = float(np.exp(-0.5 * z**2 - special.log_ndtr(z)) / np.sqrt(2.0 * np.pi))
+    along = cov[:, at] / std
+    return mean + ratio * along, cov - ratio * (ratio + z) * np.outer(along, along)
+
+
+def _width_evidences(H: np.ndarray, inertials: int, tied: np.ndarray) -> np.ndarray:
+    """Log evidence and prior of each width of the inertials' prior and of that of tied columns, (WIDTHS, WIDTHS or 1).
 
     Args:
-        H: The matrices.
-        prior: Standard deviations of the amplitudes, shape (k,) or (b, k).
+        H: Gram matrix of the inertials, then of other columns, then y.
+        inertials: How many inertials there are.
+        tied: Which of the columns are tied.
     """
-    scale = np.pad(prior, [(0, 0)] * (prior.ndim - 1) + [(0, 1)], constant_values=1.0)
-    M = with_prior(H * (scale[..., :, None] * scale[..., None, :]))
+    order = np.append(np.argsort(tied, kind="stable"), len(tied))
+    scale = np.ones((len(WIDTHS), len(H)))
+    scale[:, :inertials] = WIDTHS[:, None]
+    M = with_prior(H[np.ix_(order, order)] * (scale[:, :, None] * scale[:, None, :]))
+    k = int(np.count_nonzero(tied))
+    if not k:
+        return (_log_evidences(M) + LOG_PRIOR)[:, None]
+    # What is left of the tied columns and y beside all others is the same at each of their widths.
+    L = np.array([root(m) for m in M])
+    free = len(tied) - k
+    left = L[:, free:, free:] @ L[:, free:, free:].swapaxes(1, 2)
+    explained = M[:, -1, -1] - left[:, -1, -1]
+    by_inertials = LOG_PRIOR + 0.5 * explained - np.log(L[:, range(free), range(free)]).sum(axis=1)
+    left = left - np.eye(k + 1)
+    scales = np.pad(np.repeat(WIDTHS[:, None], k, axis=1), ((0, 0), (0, 1)), constant_values=1.0)
+    by_tied = [_log_evidences(with_prior(left * np.outer(s, s))) for s in scales]
+    return by_inertials[:, None] + np.transpose(by_tied) + LOG_PRIOR
+
+
+def _log_evidences(M: np.ndarray) -> np.ndarray:
+    """Log evidence of amplitudes from Gram matrices with their prior (b, k + 1, k + 1) whose last column is y, (b,).
+
+    The last pivot of a Cholesky factor that has y in it is what is left of y.
+    """
     diagonal = cholesky_diagonals(M)
     explained = M[:, -1, -1] - diagonal[:, -1] ** 2
     return 0.5 * explained - np.log(diagonal[:, :-1]).sum(axis=1)

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, special
 
 from irb140_jax.mismatch.regression.gaussian import root, with_prior
-from irb140_jax.mismatch.selection.evidence import Hyper, Space
+from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Hyper, Space, above_zero
 
 
 def near(space: Space, chosen: Sequence[int], hyper: Hyper, columns: np.ndarray) -> np.ndarray:
@@ -32,10 +32,10 @@ def gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) 
     across = prior[:, None] * space.gram(hyper, base, space.with_y(extra))
     half = linalg.solve_triangular(chol, across, lower=True, check_finite=False)
     with_y = space.gram(hyper, extra, np.array([space.size]))[:, 0] - half[:, :-1].T @ half[:, -1]
-    by_size: dict[int, list[int]] = {}
+    by_size: dict[tuple[int, bool], list[int]] = {}
     for m, i in enumerate(which):
-        by_size.setdefault(len(space.columns[i]), []).append(m)
-    for k, members in by_size.items():
+        by_size.setdefault((len(space.columns[i]), space.candidates[i].effect.prior.tied), []).append(m)
+    for (k, tied), members in by_size.items():
         columns = np.array([space.columns[which[m]] for m in members])
         at = number[columns]
         part = half[:, at]
@@ -47,12 +47,26 @@ def gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) 
             if len(moved):
                 M[moved] += g.at(of_joint).blocks(mine[moved])
         rhs = with_y[at]
-        mean = np.linalg.solve(M, rhs[..., None])[..., 0]
-        gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
         ids = which[members]
+        if tied:
+            gain, mean = np.array([_of_tied(m, r) for m, r in zip(M, rhs, strict=True)]), np.zeros_like(rhs)
+        else:
+            mean = np.linalg.solve(M, rhs[..., None])[..., 0]
+            gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
         known = space.log_prior[ids] + more[ids] - space.lost(ids, hyper)
         out[members] = np.where(space.outside(ids, mean), -np.inf, gain + known)
     return out
+
+
+def _of_tied(M: np.ndarray, rhs: np.ndarray) -> float:
+    """Log evidence that tied columns add over all widths of their prior, from M = 1 + X'X and X'y in prior units."""
+    size, axes = np.linalg.eigh(M - np.eye(len(M)))
+    over, along = np.outer(WIDTHS**2, np.maximum(size, 0.0)), WIDTHS[:, None] * (axes.T @ rhs)
+    gain = 0.5 * np.sum(along**2 / (1.0 + over) - np.log1p(over), axis=1) + LOG_PRIOR
+    best = int(np.argmax(gain))
+    weight = WIDTHS[best] * axes[0] / (1.0 + over[best])
+    first, std = weight @ along[best], np.sqrt(np.sum(WIDTHS[best] ** 2 * axes[0] ** 2 / (1.0 + over[best])))
+    return float(special.logsumexp(gain) + above_zero(first, std))
 
 
 def reshaped(space: Space, chosen: Sequence[int], hyper: Hyper) -> tuple[int, ...]:

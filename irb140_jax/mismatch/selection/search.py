@@ -173,7 +173,7 @@ class Search:
             others: list[tuple[frozenset[int], set[int]]] = []
             bad = space.conflicts(tuple(rest))
             special = [i for i in self._special(drop) if not bad[i]]
-            others += [(rest | {i}, joints) for i in special]
+            others += [(rest | {i}, joints | self._joints(i)) for i in special]
             others += [(rest | set(p), joints) for p in itertools.combinations(special, 2) if self._together(*p)]
             # What acts on the whole arm takes the place of its like here; of a law on each joint in `_on_all_joints`.
             whole = [len(space.joints)] if len(joints) == len(space.joints) else []
@@ -194,10 +194,15 @@ class Search:
         return now
 
     def _special(self, members: tuple[int, ...]) -> list[int]:
-        """Special cases of laws, the same laws with other terms, and ordinary friction in the place of any friction."""
+        """Special cases of laws, the same laws with other terms, and ordinary friction in the place of any friction.
+
+        A payload and the inertials of its link stand in each other's place, too.
+        """
         out = set[int]()
         for law in map(self._of, members):
             for i, c in enumerate(self.space.candidates):
+                if self.space.beside.one_body(law, c):
+                    out.add(i)
                 if c.joints == law.joints and i not in members:
                     usual = law.effect.place.is_friction and c.effect.prior.ordinary
                     terms = c.slug == law.slug and c.variant != law.variant and np.array_equal(c.shape, law.shape)

@@ -36,6 +36,8 @@ def parameters_of(
     c = ex.data.candidates[index]
     value = _physical(c, w)
     over_shapes = np.maximum(_variance_over_shapes(ex, index, value), _variance_about_shape(ex, index, w))
+    if c.effect.law.empirical:
+        cov = cov + _of_form(ex, c, w)
     w, cov = _of_all_columns(ex, index, w, cov)
     if index in ex.falls:
         # What makes it what it is counts as the speed nears zero, where the discrepancy counts, too.
@@ -54,6 +56,17 @@ def parameters_of(
         parameter.name: Estimate(float(x), float(np.sqrt(max(v, 0.0))), parameter.unit_of(slide))
         for parameter, x, v in zip(c.effect.law.parameters, value, variance, strict=True)
     }
+
+
+def _of_form(ex: Explanation, c: Candidate, w: np.ndarray) -> np.ndarray:
+    """Covariance of amplitudes (k,) where the law is of another form: `USUAL_MISFIT` of its own torque.
+
+    A misfit that looks like the law itself is in no discrepancy.  Any torque that its columns have is equally probable.
+    """
+    columns = ex.data.nuisances + c.columns
+    X = np.concatenate([s.of(columns, j)[s.use[:, j]] for s in ex.data.stretches for j in c.joints])
+    G = X.T @ X
+    return settings.USUAL_MISFIT**2 * float(w @ G @ w) / len(w) * np.linalg.pinv(G, rcond=1e-9, hermitian=True)
 
 
 def _variance_of(
