@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.validation.unexplained import Rows, competitors, predicted
+from irb140_jax.mismatch import diagnose, settings
+from irb140_jax.mismatch.validation.unexplained import Rows, competitors, predicted, shortest
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import three_motions
@@ -74,6 +74,21 @@ def test_what_one_recording_leaves_is_seen_to_go_with_time_however_much_louder_i
     time = competitors([one, one], 0, rows, ("hinge",))[-1]
     assert time.variable.startswith("time")
     assert 0.4 < predicted(time, rows.residual[:, None])[0] < 0.6  # all of one recording, nothing of the other
+
+
+@pytest.mark.parametrize("lasts", [3.0, 40.0])
+def test_a_short_time_that_holds_most_of_what_is_left_is_told_and_a_long_one_is_not(lasts):
+    rng, t = np.random.default_rng(1), 5.0 + 0.05 * np.arange(1200)
+    logs: Any = [SimpleNamespace(recording=k, t=t) for k in (0, 1)]
+    left = [rng.normal(size=1200), rng.normal(size=1200)]
+    left[1][(t > 20.0) & (t < 20.0 + lasts)] *= 30.0
+    when = shortest(logs, left)
+    if lasts > settings.BRIEF * 120.0:
+        assert when is None
+        return
+    assert when is not None and when.recording == 1
+    assert 20.0 < when.begin < when.end < 20.0 + lasts
+    assert settings.MOST <= when.share < settings.MOST + 0.05
 
 
 def test_what_the_teeth_of_a_gear_leave_goes_with_position_and_direction():

@@ -100,6 +100,8 @@ CLEARLY_BETTER = float(np.log(100.0))
 # Share of what is left that must be predictable, and share of the joint's torque: less is not worth a person's time,
 # and smoothing and imperfect laws leave as much.
 MATERIAL_SHARE, MATERIAL_TORQUE = 0.05, 0.02
+# Share of its square that a short time must hold to be told, and share of all recorded time that is short.
+MOST, BRIEF = 0.8, 0.2
 # Share of time-shifted copies that may be as predictable.
 SIGNIFICANT = 0.01
 # Share of what time predicts that a competitor which knows the motion must reach to be named instead.

@@ -95,7 +95,7 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     return rounded(Diagnosis(
         verdict=kind,
         findings=tuple(found),
-        unexplained=tuple(_unexplained(robot, s) for s in of.rest),
+        unexplained=tuple(_unexplained(robot, s, of.data.names) for s in of.rest),
         not_testable=not_testable(robot, {f.effect for f in found}, of.seen, effects.values()),
         fit=fit,
         notes=tuple(_notes(of, missing, torque_size(of.proof, logged))),
@@ -156,9 +156,12 @@ def fit_by_joint(robot: Robot, proof: HeldOut, scatter: np.ndarray, *, at_rest: 
     }
 
 
-def _unexplained(robot: Robot, s: Structure) -> Unexplained:
+def _unexplained(robot: Robot, s: Structure, recordings: Sequence[str]) -> Unexplained:
     name, unit = robot.joint_names[s.joint], "N" if robot.is_slide[s.joint] else "N m"
     where = f"{name}: {s.rms:.3g} {unit} RMS that no effect explains; it depends on {s.variable}"
+    if when := s.when:
+        time = f"from {when.begin:.4g} to {when.end:.4g} s of {recordings[when.recording]}"
+        where += f"; {100 * when.share:.0f} % of the squared error is {time}"
     return Unexplained((name,), where, s.share, s.p_value)
 
 

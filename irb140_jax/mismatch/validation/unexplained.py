@@ -32,6 +32,21 @@ MOST_COSINES = 600  # of a recording: along one of more than five minutes they f
 TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
 
 
+class When(NamedTuple):
+    """A short time that holds most of what is left.
+
+    Attributes:
+        recording: Index.
+        begin, end: In the time of its log [s].
+        share: Of the squared residual of all recordings.
+    """
+
+    recording: int
+    begin: float
+    end: float
+    share: float
+
+
 @dataclasses.dataclass(frozen=True)
 class Structure:
     """What is left at one joint.
@@ -42,6 +57,7 @@ class Structure:
         p_value: Share of time-shifted copies that are as predictable.
         variable: The variables that carry it, in words.
         rms: Size of the predictable part [N m or N].
+        when: Where it is that short.
     """
 
     joint: int
@@ -49,6 +65,7 @@ class Structure:
     p_value: float
     variable: str
     rms: float
+    when: When | None = None
 
 
 class Competitor(NamedTuple):
@@ -110,9 +127,31 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
             p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
             if share >= least and p <= settings.SIGNIFICANT:
                 size = float(np.sqrt(share) * rmse[j])
-                out.append(Structure(j, share, p, rivals[best].variable, size))
+                when = shortest(ex.data.stretches, [np.where(s.use, r, 0.0)[:, j] for s, r in
+                                                    zip(ex.data.stretches, proof.left, strict=True)])  # fmt: skip
+                out.append(Structure(j, share, p, rivals[best].variable, size, when))
                 break
     return out
+
+
+def shortest(stretches: list[Stretch], residuals: list[np.ndarray]) -> When | None:
+    """The shortest time that holds `MOST` of the square of some residuals (R,); None where it is not `BRIEF`.
+
+    Where a law holds but for some seconds, those are what to look at, or to leave out.
+    """
+    total = sum(float(np.sum(r**2)) for r in residuals)
+    recorded = sum(float(s.t[-1] - s.t[0]) for s in stretches)
+    best, least = None, settings.BRIEF * recorded
+    for s, r in zip(stretches, residuals, strict=True):
+        so_far = np.append(0.0, np.cumsum(r**2))
+        end = np.searchsorted(so_far, so_far[:-1] + settings.MOST * total)
+        first = np.flatnonzero(end < len(so_far))
+        lasts = s.t[end[first] - 1] - s.t[first]
+        if len(first) and np.min(lasts) < least:
+            i = int(first[np.argmin(lasts)])
+            share = float((so_far[end[i]] - so_far[i]) / total)
+            best, least = When(s.recording, float(s.t[i]), float(s.t[end[i] - 1]), share), float(np.min(lasts))
+    return best
 
 
 def _carrier(rivals: list[Competitor], shares: np.ndarray) -> int:
