@@ -18,7 +18,7 @@ from irb140_jax.mismatch.corrected.native import beyond_file
 from irb140_jax.mismatch.experiment_design.nothing_compared import all_open
 from irb140_jax.mismatch.experiment_design.undecided import undecided
 from irb140_jax.mismatch.motion import motion_unseen
-from irb140_jax.mismatch.output.document import Found, document, document_of_nothing, report_views
+from irb140_jax.mismatch.output.document import Found, beside_strange_time, document, document_of_nothing, report_views
 from irb140_jax.mismatch.output.findings import findings, torque_scale_odds
 from irb140_jax.mismatch.output.provenance import provenance
 from irb140_jax.mismatch.output.servos import by_known_payload, harmful_discrepancy, without_negligible
@@ -29,9 +29,10 @@ from irb140_jax.mismatch.regression.sufficient_data import Comparison, compariso
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted, unproved
+from irb140_jax.mismatch.validation.strange_time import common_time, without
 from irb140_jax.mismatch.validation.testable import reference, visibility
 from irb140_jax.mismatch.validation.undecided_joints import made_worse
-from irb140_jax.mismatch.validation.unexplained import unexplained
+from irb140_jax.mismatch.validation.unexplained import Structure, unexplained
 from irb140_jax.recordings.drive import PAYLOAD
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
@@ -115,8 +116,10 @@ def diagnose(
 
 
 def _diagnosed(
-    robot: Robot, recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None]
-) -> Result:
+    robot: Robot, recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None],
+    whole: float = 0.0,
+) -> Result:  # fmt: skip
+    """See `diagnose`; `whole` is how long all was recorded [s], where some time is left out already."""
     data = comparison(robot, recordings, config.inertial_uncertainty, progress)
     if reason := too_little(data.smooth, data.band):
         return _nothing_compared(data, config, reason)
@@ -124,7 +127,8 @@ def _diagnosed(
     ex = _explained(data, sensors, config, progress)
     if data.servo is not None and any(ex.payloads) and PAYLOAD not in data.servo.drive.said:
         progress("once more, in torque of the Kp that the known payload shows")
-        return _diagnosed(robot, by_known_payload(ex, data.servo, recordings, data.recordings), config, progress)
+        known = by_known_payload(ex, data.servo, recordings, data.recordings)
+        return _diagnosed(robot, known, config, progress, whole)
     data = data.placed(ex.payloads)
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
@@ -138,6 +142,8 @@ def _diagnosed(
         corrected = _corrected(data, ex, refit, left, config)
     progress("looking for structure that no effect explains")
     rest, found = unexplained(ex, left), findings(robot, ex)
+    if (result := _without_strange_time(data, ex, left, rest, recordings, config, progress, whole)) is not None:
+        return result
     stated = data.servo
     data, model, proof, harmful, by_laws = corrected
     bare = data
@@ -153,6 +159,31 @@ def _diagnosed(
     progress("simulating motions that the fit did not see")
     motion = motion_unseen(bare, ex, proof, refit.loose, model, beyond)
     return Result(diagnosis, model, report_views(of, diagnosis.notes, motion), open_)
+
+
+def _without_strange_time(
+    data: Comparison, ex: Explanation, proof: HeldOut, rest: Sequence[Structure], recordings: Sequence[Recording],
+    config: DiagnoseConfig, progress: Callable[[str], None], whole: float,
+) -> Result | None:  # fmt: skip
+    """The result of all but a short time in which nothing explains most joints; None where there is no such time.
+
+    At least half of all that was recorded stays.
+    """
+    recorded = sum(float(s.t[-1] - s.t[0]) for s in ex.data.stretches)
+    whole, when = max(whole, recorded), common_time(rest, int(proof.judged.sum()), recorded)
+    if when is None or 2.0 * (recorded - (when.end - when.begin)) < whole:
+        return None
+    if (others := without(recordings, data.names[when.recording], when)) is None:
+        return None
+    said = f"from {when.begin:.4g} to {when.end:.4g} s of {data.names[when.recording]}"
+    progress(f"once more, without what nothing explains {said}")
+    result = _diagnosed(data.robot, others, config, progress, whole)
+    if result.diagnosis.verdict == "undecided":
+        return None
+    diagnosis = beside_strange_time(result.diagnosis, said, rest, data)
+    return dataclasses.replace(
+        result, diagnosis=diagnosis, views=dataclasses.replace(result.views, notes=diagnosis.notes)
+    )
 
 
 def _nothing_compared(data: Comparison, config: DiagnoseConfig, reason: str) -> Result:

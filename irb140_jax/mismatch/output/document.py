@@ -104,6 +104,31 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     ))  # fmt: skip
 
 
+def beside_strange_time(
+    diagnosis: Diagnosis, when: str, rest: Sequence[Structure], data: Comparison
+) -> Diagnosis:
+    """The diagnosis of all but a short time in which nothing explains the torque of most joints, with that said.
+
+    Args:
+        diagnosis: Of all else.
+        when: The time in words.
+        rest: What nothing explained before that was left out.
+        data: Model and recordings, as they were then.
+    """
+    strange = [s for s in rest if s.when is not None]
+    joints = ", ".join(data.robot.joint_names[s.joint] for s in strange)
+    said = (
+        f"Nothing explains the torque of {joints} {when}; this time is left out of everything else that is said, and "
+        "what is named is of the rest."
+    )
+    left = (*(_unexplained(data.robot, s, data.names) for s in strange), *diagnosis.unexplained)
+    silent = diagnosis.verdict in ("no_mismatch", "parameters_only")
+    return rounded(dataclasses.replace(
+        diagnosis, verdict="unexplained" if silent else diagnosis.verdict, unexplained=left,
+        notes=(said, *diagnosis.notes), summary=f"{diagnosis.summary} {said}",
+    ))  # fmt: skip
+
+
 def document_of_nothing(
     data: Comparison, reason: str, seen: Seen, effects: Sequence[Effect], uncertainty: float, origin: Provenance
 ) -> Diagnosis:

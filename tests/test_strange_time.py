@@ -1,0 +1,80 @@
+"""A short time in which most joints do what nothing explains is left out of a diagnosis, which says so."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from irb140_jax.mismatch import diagnose
+from irb140_jax.mismatch.validation.strange_time import common_time, without
+from irb140_jax.mismatch.validation.unexplained import Structure, When
+from irb140_jax.recordings import Recording
+from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
+from irb140_jax.recordings.concealed.plant import arm_spec
+from irb140_jax.recordings.excite import three_motions
+from irb140_jax.robot import robot_from_model
+
+
+def left(joint: int, when: When | None) -> Structure:
+    return Structure(joint, 0.5, 0.01, "time", 1.0, when)
+
+
+def test_the_time_of_most_joints_is_common_where_theirs_overlap():
+    one, other, later = When(1, 3.0, 4.0, 0.9), When(1, 3.5, 4.5, 0.8), When(1, 8.0, 9.0, 0.9)
+    assert common_time([left(0, one), left(2, other)], 3, 30.0) == When(1, 3.0, 4.5, 0.8)
+    assert common_time([left(0, one)], 1, 30.0) == one
+    for rest, joints, recorded in (
+        ([left(0, one)], 2, 30.0),  # no more than half of the joints
+        ([left(0, one), left(1, None)], 2, 30.0),
+        ([left(0, one), left(1, later)], 2, 30.0),
+        ([left(0, one), left(1, other._replace(recording=0))], 2, 30.0),
+        ([left(0, one), left(1, other)], 2, 7.0),  # not short
+        ([], 2, 30.0),
+    ):
+        assert common_time(rest, joints, recorded) is None
+
+
+def test_what_comes_before_and_after_stays():
+    t = 2.0 + np.arange(4000) / 200.0
+    motion = np.stack([np.sin(t), np.cos(t)], axis=1)
+    one, other = (
+        Recording(t=t, q=motion, tau=2.0 * motion, joint_names=("a", "b"), source=name, sha256="x") for name in "mn"
+    )
+    parts = without([one, other], "m", When(0, 10.0, 12.0, 0.9))
+    assert parts is not None
+    before, after, untouched = parts
+    assert before.source == after.source == "m" and before.sha256 == "x" and untouched is other
+    assert before.t[-1] < 10.0 and after.t[0] > 12.0 and len(before.t) + len(after.t) > 3500
+    np.testing.assert_array_equal(after.tau[:, 0], 2.0 * np.sin(after.t))
+    only = without([one], "m", When(0, 2.5, 12.0, 0.9)) or []
+    assert [r.t[0] > 12.0 for r in only] == [True]  # half a second before it is nothing
+    assert without([one, one], "m", When(0, 10.0, 12.0, 0.9)) is None
+
+
+@pytest.fixture(scope="module")
+def arm():
+    xml = random_robot(2, 3, slides=0.0)
+    robot = robot_from_model(arm_spec(xml).compile(), "random")
+    hidden = [Concealment("viscous_friction", (robot.joint_names[1],), 0.3)]
+    return robot, conceal(xml, hidden, three_motions(robot, 8.0, seed=2), seed=3)
+
+
+def test_seconds_of_another_torque_are_told_and_spoil_nothing_else(arm):
+    robot, case = arm
+    recordings, hit = list(case.recordings), case.recordings[1]
+    low = signal.butter(2, 3.0, fs=1.0 / float(np.median(np.diff(hit.t))), output="sos")
+    other = signal.sosfiltfilt(low, np.random.default_rng(0).normal(size=hit.tau.shape), axis=0)
+    other *= 3.0 * np.std(hit.tau, axis=0) / np.std(other, axis=0)
+    then = (hit.t > 3.0) & (hit.t < 4.5)
+    recordings[1] = dataclasses.replace(hit, tau=np.where(then[:, None], other, hit.tau))
+    result = diagnose(robot, recordings)
+    diagnosis = result.diagnosis
+    (finding,) = diagnosis.findings
+    (effect,) = case.truth["effects"]
+    assert (finding.effect, list(finding.joints)) == (effect["effect"], effect["joints"])
+    assert finding.parameters["viscous"].value == pytest.approx(effect["parameters"]["viscous"]["value"], rel=0.01)
+    assert diagnosis.unexplained and all(f"s of {hit.source}" in u.where for u in diagnosis.unexplained)
+    assert diagnosis.notes[0].startswith("Nothing explains the torque of") and diagnosis.notes[0] in diagnosis.summary
+    assert result.views.notes == diagnosis.notes
+    assert all((f.rmse_corrected or 0.0) < 2.0 * (f.noise_floor or 0.0) for f in diagnosis.fit.values())
