@@ -236,12 +236,14 @@ def pendulum(result: dict) -> list[str]:
 
 def arm(result: dict) -> list[str]:
     """What was named of the hobby arm."""
-    notes = [n for n in result["arm"]["notes"] if "Kp" in n or "Commands" in n or "not judged" in n.lower()]
+    told = ("Kp", "Commands", "Nothing explains", "ot judged")
+    notes = [n for n in result["arm"]["notes"] if any(word in n for word in told)]
+    each = "; ".join(f"{named([f])} on {', '.join(f['joints'])}" for f in result["arm"]["findings"])
     return [
         "## A hobby arm (`so101`)", "",
         f"Commands and positions at 50 Hz; Kp as published for the servo, to 40 %; {', '.join(result['motions'])}.",
         f"Verdict: `{result['arm']['verdict']}`.",
-        f"Named: {named(result['arm']['findings']) or 'nothing'}.", "", *(f"- {n}" for n in notes), "",
+        f"Named: {each or 'nothing'}.", "", *(f"- {n}" for n in notes), "",
         f"The motion in which the wrist roll is blocked, by itself: `{result['blocked_wrist_roll']['verdict']}`,",
         f"{named(result['blocked_wrist_roll']['findings']) or 'nothing named'}.",
         "",

@@ -11,6 +11,7 @@ import pathlib
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -64,9 +65,9 @@ def refused(recordings: Sequence[Recording], robot: Robot) -> list[bool]:
     return out
 
 
-def sound() -> dict[str, int]:
-    """Recordings with one effect each: how many there are and how many are refused."""
-    count, lost, seed = 0, 0, 1000
+def sound() -> dict[str, Any]:
+    """Recordings with one effect each: how many there are, how many are refused, and of which cases."""
+    count, lost, seed, which = 0, 0, 1000, []
     for name, model, robot in arms():
         for slug in HIDDEN:
             for share in SHARES:
@@ -82,8 +83,9 @@ def sound() -> dict[str, int]:
                     continue
                 out = refused(case.recordings, robot)
                 count, lost = count + len(out), lost + sum(out)
+                which += [f"{slug} of {share:.0%} on the {name}"] * any(out)
                 print(name, slug, share, out, flush=True)
-    return {"recordings": count, "refused": lost}
+    return {"recordings": count, "refused": lost, "of": which}
 
 
 def ways(n: int) -> Iterator[tuple[str, Way]]:
@@ -125,11 +127,13 @@ def paragraph(result: dict) -> str:
     span = lambda x: f"{min(x)}" if min(x) == max(x) else f"{min(x)} to {max(x)}"  # noqa: E731
     sizes = ", ".join(map(str, JOINTS))
     so_many = lambda k: f"{k or 'none'} {'is' if k == 1 else 'are'} refused"  # noqa: E731
+    which = f" ({', '.join(fine['of'])})" if fine["of"] else ""
     lines = (
         f"MuJoCo made {fine['recordings']} recordings with one of {len(HIDDEN)} hidden effects: the IRB 140 and",
         f"random arms of {sizes} joints, inertials 20 % wrong, 5 % torque noise, effects of 20 and 80 % of a joint's",
-        f"torque. Of these {so_many(fine['refused'])}. Of {of} recordings of the IRB 140 (fast, point to point, slow)",
-        f"{so_many(none)} as they are. Spoiled in one way each, of {of} are refused, by joint or pair of joints:",
+        f"torque. Of these {so_many(fine['refused'])}{which}. Of {of} recordings of the IRB 140",
+        f"(fast, point to point, slow) {so_many(none)} as they are. Spoiled in one way each, of {of} are refused,",
+        "by joint or pair of joints:",
     )
     each = "\n".join(f"- {name}: {span(x)}" for name, x in wrong.items())
     return "\n".join((WORD, *lines, "", each, "", WORD))
