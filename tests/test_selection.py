@@ -157,6 +157,16 @@ def test_a_payload_is_as_probable_as_its_data_over_all_widths_of_its_prior_with_
         np.testing.assert_allclose(spread / np.outer(scale, scale), np.cov(drawn.T) / np.outer(scale, scale), atol=0.01)
 
 
+def test_a_payload_whose_mass_moves_nothing_is_not_found():
+    space, _ = planted(2, {4: -2.0})
+    space = with_payload(space)
+    space.lowest[0, 0] = np.inf
+    assert space.log_evidence((0,), (SETTING, SETTING)) == -np.inf
+    assert gains(space, (), (SETTING, SETTING), np.array([0])) == [-np.inf]
+    space.lowest[0, 0] = 0.0
+    assert np.isfinite(space.log_evidence((0,), (SETTING, SETTING)))
+
+
 def test_screening_says_of_a_payload_what_the_evidence_says_at_the_width_of_the_inertials_of_the_set_before():
     space, data = planted(2, {0: 3.0, 4: -2.0})
     space, hyper = with_payload(space), (SETTING, SETTING)

@@ -79,16 +79,17 @@ def test_what_one_recording_leaves_is_seen_to_go_with_time_however_much_louder_i
 @pytest.mark.parametrize("lasts", [3.0, 40.0])
 def test_a_short_time_that_holds_most_of_what_is_left_is_told_and_a_long_one_is_not(lasts):
     rng, t = np.random.default_rng(1), 5.0 + 0.05 * np.arange(1200)
-    logs: Any = [SimpleNamespace(recording=k, t=t) for k in (0, 1)]
+    logs: Any = [SimpleNamespace(recording=k, t=t, tau=np.full((1200, 1), 50.0)) for k in (0, 1)]
     left = [rng.normal(size=1200), rng.normal(size=1200)]
     left[1][(t > 20.0) & (t < 20.0 + lasts)] *= 30.0
-    when = shortest(logs, left)
+    when = shortest(logs, left, 0)
     if lasts > settings.BRIEF * 120.0:
         assert when is None
         return
     assert when is not None and when.recording == 1
     assert 20.0 < when.begin < when.end < 20.0 + lasts
-    assert settings.MOST <= when.share < settings.MOST + 0.05
+    assert settings.MOST_OF_ERROR <= when.share < settings.MOST_OF_ERROR + 0.05
+    assert when.of_torque == pytest.approx(30.0 / 50.0, rel=0.2)
 
 
 def test_what_the_teeth_of_a_gear_leave_goes_with_position_and_direction():

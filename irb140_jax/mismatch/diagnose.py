@@ -18,7 +18,7 @@ from irb140_jax.mismatch.corrected.native import beyond_file
 from irb140_jax.mismatch.experiment_design.nothing_compared import all_open
 from irb140_jax.mismatch.experiment_design.undecided import undecided
 from irb140_jax.mismatch.motion import motion_unseen
-from irb140_jax.mismatch.output.document import Found, beside_strange_time, document, document_of_nothing, report_views
+from irb140_jax.mismatch.output.document import Found, document, document_of_nothing, report_views, with_time_left_out
 from irb140_jax.mismatch.output.findings import findings, torque_scale_odds
 from irb140_jax.mismatch.output.provenance import provenance
 from irb140_jax.mismatch.output.servos import by_known_payload, harmful_discrepancy, without_negligible
@@ -29,10 +29,10 @@ from irb140_jax.mismatch.regression.sufficient_data import Comparison, compariso
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted, unproved
-from irb140_jax.mismatch.validation.strange_time import common_time, without
 from irb140_jax.mismatch.validation.testable import reference, visibility
 from irb140_jax.mismatch.validation.undecided_joints import made_worse
 from irb140_jax.mismatch.validation.unexplained import Structure, unexplained
+from irb140_jax.mismatch.validation.unexplained_time import common_time, without
 from irb140_jax.recordings.drive import PAYLOAD
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
@@ -142,7 +142,7 @@ def _diagnosed(
         corrected = _corrected(data, ex, refit, left, config)
     progress("looking for structure that no effect explains")
     rest, found = unexplained(ex, left), findings(robot, ex)
-    if (result := _without_strange_time(data, ex, left, rest, recordings, config, progress, whole)) is not None:
+    if (result := _without_unexplained_time(data, ex, left, rest, recordings, config, progress, whole)) is not None:
         return result
     stated = data.servo
     data, model, proof, harmful, by_laws = corrected
@@ -161,7 +161,7 @@ def _diagnosed(
     return Result(diagnosis, model, report_views(of, diagnosis.notes, motion), open_)
 
 
-def _without_strange_time(
+def _without_unexplained_time(
     data: Comparison, ex: Explanation, proof: HeldOut, rest: Sequence[Structure], recordings: Sequence[Recording],
     config: DiagnoseConfig, progress: Callable[[str], None], whole: float,
 ) -> Result | None:  # fmt: skip
@@ -180,7 +180,7 @@ def _without_strange_time(
     result = _diagnosed(data.robot, others, config, progress, whole)
     if result.diagnosis.verdict == "undecided":
         return None
-    diagnosis = beside_strange_time(result.diagnosis, said, rest, data)
+    diagnosis = with_time_left_out(result.diagnosis, said, rest, data)
     return dataclasses.replace(
         result, diagnosis=diagnosis, views=dataclasses.replace(result.views, notes=diagnosis.notes)
     )

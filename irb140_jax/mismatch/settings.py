@@ -101,7 +101,7 @@ CLEARLY_BETTER = float(np.log(100.0))
 # and smoothing and imperfect laws leave as much.
 MATERIAL_SHARE, MATERIAL_TORQUE = 0.05, 0.02
 # Share of its square that a short time must hold to be told, and share of all recorded time that is short.
-MOST, BRIEF = 0.8, 0.2
+MOST_OF_ERROR, BRIEF = 0.8, 0.2
 # Share of time-shifted copies that may be as predictable.
 SIGNIFICANT = 0.01
 # Share of what time predicts that a competitor which knows the motion must reach to be named instead.

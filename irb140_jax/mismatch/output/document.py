@@ -35,6 +35,7 @@ from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.mismatch.validation.testable import Seen, not_testable, shows_no_friction
 from irb140_jax.mismatch.validation.undecided_joints import torque_size, undecidable
 from irb140_jax.mismatch.validation.unexplained import Structure
+from irb140_jax.mismatch.validation.unexplained_time import mostly_unexplained
 from irb140_jax.recordings.condition import Commanded
 from irb140_jax.robot import Robot
 
@@ -104,7 +105,7 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     ))  # fmt: skip
 
 
-def beside_strange_time(
+def with_time_left_out(
     diagnosis: Diagnosis, when: str, rest: Sequence[Structure], data: Comparison
 ) -> Diagnosis:
     """The diagnosis of all but a short time in which nothing explains the torque of most joints, with that said.
@@ -115,13 +116,13 @@ def beside_strange_time(
         rest: What nothing explained before that was left out.
         data: Model and recordings, as they were then.
     """
-    strange = [s for s in rest if s.when is not None]
-    joints = ", ".join(data.robot.joint_names[s.joint] for s in strange)
+    brief = mostly_unexplained(rest)
+    joints = ", ".join(data.robot.joint_names[s.joint] for s in brief)
     said = (
-        f"Nothing explains the torque of {joints} {when}; this time is left out of everything else that is said, and "
-        "what is named is of the rest."
+        f"Nothing explains most of the torque of {joints} {when}; this time is left out of everything else that is "
+        "said, and what is named is of the rest."
     )
-    left = (*(_unexplained(data.robot, s, data.names) for s in strange), *diagnosis.unexplained)
+    left = (*(_unexplained(data.robot, s, data.names) for s in brief), *diagnosis.unexplained)
     silent = diagnosis.verdict in ("no_mismatch", "parameters_only")
     return rounded(dataclasses.replace(
         diagnosis, verdict="unexplained" if silent else diagnosis.verdict, unexplained=left,

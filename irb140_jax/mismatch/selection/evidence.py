@@ -332,9 +332,12 @@ class Space:
     def outside(self, which: np.ndarray, mean: np.ndarray) -> np.ndarray:
         """Which candidates' amplitudes (candidates, k) are inadmissible."""
         k = mean.shape[1]
-        # Tied ones may seem impossible by what is not known of them: their bound is in the evidence.
-        free = np.array([self.candidates[i].effect.prior.tied for i in which], dtype=bool)
-        bad = np.any((mean < self.lowest[which, :k] - 1e-9) | (mean > self.highest[which, :k] + 1e-9), axis=1) & ~free
+        # Tied ones may seem impossible by what is not known of them: their bound is in the evidence.  What moves
+        # nothing has an infinite one.
+        tied = np.array([self.candidates[i].effect.prior.tied for i in which], dtype=bool)
+        lowest = self.lowest[which, :k]
+        lowest = np.where(tied[:, None] & np.isfinite(lowest), -np.inf, lowest)
+        bad = np.any((mean < lowest - 1e-9) | (mean > self.highest[which, :k] + 1e-9), axis=1)
         return bad | (np.sum(mean * self.weights[which, :k], axis=1) < self.least[which])
 
 

@@ -39,12 +39,14 @@ class When(NamedTuple):
         recording: Index.
         begin, end: In the time of its log [s].
         share: Of the squared residual of all recordings.
+        of_torque: Residual over logged torque in that time, root mean squares.
     """
 
     recording: int
     begin: float
     end: float
     share: float
+    of_torque: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,30 +129,35 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
             p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
             if share >= least and p <= settings.SIGNIFICANT:
                 size = float(np.sqrt(share) * rmse[j])
-                when = shortest(ex.data.stretches, [np.where(s.use, r, 0.0)[:, j] for s, r in
-                                                    zip(ex.data.stretches, proof.left, strict=True)])  # fmt: skip
+                both = zip(ex.data.stretches, proof.left, strict=True)
+                when = shortest(ex.data.stretches, [np.where(s.use, r, 0.0)[:, j] for s, r in both], j)
                 out.append(Structure(j, share, p, rivals[best].variable, size, when))
                 break
     return out
 
 
-def shortest(stretches: list[Stretch], residuals: list[np.ndarray]) -> When | None:
-    """The shortest time that holds `MOST` of the square of some residuals (R,); None where it is not `BRIEF`.
+def shortest(stretches: list[Stretch], residuals: list[np.ndarray], j: int) -> When | None:
+    """The shortest time that holds `MOST_OF_ERROR` of the square of joint j's residuals; None where it is not `BRIEF`.
 
-    Where a law holds but for some seconds, those are what to look at, or to leave out.
+    Args:
+        stretches: Rows of all recordings.
+        residuals: Of each [N m or N], shape (R,), zero in rows that don't count.
+        j: The joint.
     """
     total = sum(float(np.sum(r**2)) for r in residuals)
     recorded = sum(float(s.t[-1] - s.t[0]) for s in stretches)
     best, least = None, settings.BRIEF * recorded
     for s, r in zip(stretches, residuals, strict=True):
         so_far = np.append(0.0, np.cumsum(r**2))
-        end = np.searchsorted(so_far, so_far[:-1] + settings.MOST * total)
+        end = np.searchsorted(so_far, so_far[:-1] + settings.MOST_OF_ERROR * total)
         first = np.flatnonzero(end < len(so_far))
         lasts = s.t[end[first] - 1] - s.t[first]
         if len(first) and np.min(lasts) < least:
             i = int(first[np.argmin(lasts)])
-            share = float((so_far[end[i]] - so_far[i]) / total)
-            best, least = When(s.recording, float(s.t[i]), float(s.t[end[i] - 1]), share), float(np.min(lasts))
+            error, counts = so_far[end[i]] - so_far[i], r[i : end[i]] != 0.0
+            of_torque = float(np.sqrt(error / max(float(np.sum(s.tau[i : end[i], j][counts] ** 2)), 1e-300)))
+            best = When(s.recording, float(s.t[i]), float(s.t[end[i] - 1]), float(error / total), of_torque)
+            least = float(np.min(lasts))
     return best
 
 

@@ -1,4 +1,4 @@
-"""A short time in which most joints do what nothing explains: a diagnosis leaves it out, and says so.
+"""A short time in which nothing explains most of the torque of most joints: a diagnosis leaves it out, and says so.
 
 A servo in another mode, a hand on the arm, a cable that catches: some seconds of it spoil every estimate that is made
 of all rows.
@@ -15,14 +15,16 @@ from irb140_jax.recordings.recording import Recording, rows_of
 
 
 def common_time(rest: Sequence[Structure], joints: int, recorded: float) -> When | None:
-    """From when to when most joints have most of what nothing explains; None where there is no such short time.
+    """From when to when nothing explains most of the torque of most joints; None where there is no such short time.
+
+    Fast motion has most of any error, however little of the torque that is, and alone shows what only fast motion can.
 
     Args:
         rest: What nothing explains.
         joints: How many were judged.
         recorded: How long they were recorded [s].
     """
-    short = [s.when for s in rest if s.when is not None]
+    short = [s.when for s in mostly_unexplained(rest) if s.when]
     if not short or 2 * len(short) <= joints or len({w.recording for w in short}) > 1:
         return None
     if max(w.begin for w in short) > min(w.end for w in short):
@@ -30,7 +32,13 @@ def common_time(rest: Sequence[Structure], joints: int, recorded: float) -> When
     begin, end = min(w.begin for w in short), max(w.end for w in short)
     if end - begin > settings.BRIEF * recorded:
         return None
-    return When(short[0].recording, begin, end, min(w.share for w in short))
+    share, of_torque = np.min([(w.share, w.of_torque) for w in short], axis=0)
+    return When(short[0].recording, begin, end, float(share), float(of_torque))
+
+
+def mostly_unexplained(rest: Sequence[Structure]) -> list[Structure]:
+    """What nothing explains for a short time in which it is a large share of the joint's torque."""
+    return [s for s in rest if s.when is not None and s.when.of_torque > settings.LARGE_ERROR]
 
 
 def without(recordings: Sequence[Recording], name: str, when: When) -> list[Recording] | None:
