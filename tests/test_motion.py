@@ -4,6 +4,7 @@ import dataclasses
 import json
 import types
 
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
@@ -19,11 +20,12 @@ from irb140_jax.mismatch.motion import proof_in_motion
 from irb140_jax.mismatch.motion.laws import without_those
 from irb140_jax.mismatch.motion.sentences import lost, sentences
 from irb140_jax.mismatch.motion.windows import Span, spans, windows
-from irb140_jax.oracle.rollout import positions, simulated_model
+from irb140_jax.oracle.mujoco import inverse_dynamics_along, oracle_model
+from irb140_jax.oracle.rollout import positions, positions_under_law, simulated_model
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.report import html_report
-from irb140_jax.robot import Robot, robot_from_model, with_phi
+from irb140_jax.robot import Robot, robot_from_model, robot_mjcf, with_phi
 
 ARM = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
 <body pos="0 0 1"><joint name="a" axis="0 1 0"/><inertial mass="2" pos="0.3 0 0" diaginertia="0.01 0.02 0.02"/>
@@ -92,6 +94,19 @@ def test_simulated_motion_is_that_of_an_integrator_of_high_order():
     without = positions([model], q0[None], qd0[None], steps[None])[0, -1]
     assert np.abs(ours - true).max() < 1e-3  # what damping and Coriolis torque half a step early amount to
     assert np.abs(without - true).max() > 1.5 * np.abs(ours - true).max()
+
+
+@pytest.mark.parametrize("step", [0.001, 0.01])
+def test_a_joint_that_friction_holds_stays_where_it_is(step):
+    robot, still = robot_of(ARM), np.zeros((1, 2))
+    gravity = np.abs(inverse_dynamics_along(oracle_model(ARM), still, still, still)[0])
+    model = simulated_model(robot_mjcf(dataclasses.replace(robot, frictionloss=jnp.asarray(2.0 * gravity))), step)
+    went = positions([model], still, still, np.zeros((1, round(10.0 / step), 2)))[0, -1]
+    assert np.all(gravity > 1.0) and np.abs(went).max() < 2e-3  # with MuJoCo's default, half a radian
+    bare = simulated_model(robot_mjcf(robot), step)
+    fell = positions_under_law([bare], still, still, np.zeros((1, round(2.0 / step), 2)), None, lambda *_: (
+        2.0 * gravity[None], still))[0, -1]  # fmt: skip
+    assert np.abs(fell).max() < 2e-3
 
 
 def test_what_flies_away_is_infinite_and_leaves_no_file_behind(tmp_path, monkeypatch):
