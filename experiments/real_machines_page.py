@@ -246,9 +246,9 @@ def arm(result: dict) -> list[str]:
         f"Named: {each or 'nothing'}.", "", *(f"- {n}" for n in notes), "",
         f"The motion in which the wrist roll is blocked, by itself: `{result['blocked_wrist_roll']['verdict']}`,",
         f"{named(result['blocked_wrist_roll']['findings']) or 'nothing named'}.",
-        "",
+        *(f"Unexplained: {u['where']}." for u in result["blocked_wrist_roll"]["unexplained"]), "",
         "Simulated from the commands of the six motions that were kept back, root mean square of the position error",
-        "[rad]; the baseline, which came with the data, was fitted to the positions of eight motions:", "",
+        "[rad]; the baseline, which came with the data, was fitted to the positions of the same eight motions:", "",
         f"| model | {' | '.join(ARM_JOINTS)} |", f"|---|{'---|' * len(ARM_JOINTS)}",
         *(f"| {said} | {' | '.join(f'{x:.4f}' for x in result['arm']['position_rmse'][name] or ()) or FLEW} |"
           for name, said in zip(MODELS, ("as given", "inertials refitted", "`corrected.xml`"), strict=True)),

@@ -33,6 +33,7 @@ from irb140_jax.recordings.machines import (
     so101_model,
     so101_recording,
 )
+from irb140_jax.recordings.machines.so101 import FITTED as ARM_MOTIONS
 from irb140_jax.recordings.machines.so101 import HELD_OUT as ARM_UNSEEN
 from irb140_jax.recordings.machines.unitree_go2 import HELD_OUT, LEGS, PARTS, SWEEPS, go2_joints
 from irb140_jax.recordings.servo import taken_up, with_torque
@@ -42,7 +43,6 @@ CUTOFF, ENDS = 15.0, 0.15  # Hz and s of the baseline's comparison: both sides f
 # Root mean square over the legs on held-out sweeps, with offsets and a delay [N m].
 BASELINE = {"A": (0.093, 0.058, 0.266), "B": (0.136, 0.092, 0.305)}
 RIGID = {"A": (0.401, 0.403, 1.237), "B": (0.465, 0.489, 1.451)}
-ARM_MOTIONS = ("chirp_sweep", "multisine")
 JUDGED = 400  # gain of the pendulum's runs that are kept back
 SIMULATED = 1e-3  # s of a step
 

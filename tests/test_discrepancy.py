@@ -1,10 +1,16 @@
 """What the model discrepancy can stand for, and what it leaves to the laws: on a motion of one joint."""
 
+import dataclasses
+
 import numpy as np
 import pytest
+from test_tangent import BAND, ROBOT, SMOOTH, N
 
 from irb140_jax.effects import Scales
+from irb140_jax.mismatch.columns.along import Prepared, prepared, scales_of
+from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.regression.discrepancy import features as blocks
+from irb140_jax.mismatch.regression.nuisances import BESIDE_FRICTION, SCALED, feature_coefficients, nuisances
 from irb140_jax.recordings.condition import Conditioned
 
 RATE = 200.0
@@ -87,3 +93,41 @@ def test_a_spring_that_hardens_differs_from_a_linear_one_by_what_the_block_of_po
 def test_friction_that_nears_its_level_slowly_differs_from_dry_friction_by_what_the_block_of_speed_holds(still):
     slow = 2.0 / np.pi * np.arctan(QD / (still * np.abs(QD).max()))
     assert explained(slow - SIGN, 1.0, slice(1, 2)) > 0.95
+
+
+def two_recordings() -> list[Prepared]:
+    """A motion, and another of a tenth of its size in which the first joint rests."""
+    small, rests = 0.1 * np.ones(N), np.arange(N) == 0
+    small[rests] = 0.0
+    middle = SMOOTH.q.mean(axis=0)
+    other = dataclasses.replace(
+        SMOOTH, q=middle + small * (SMOOTH.q - middle), qd=small * SMOOTH.qd, qdd=small * SMOOTH.qdd,
+        direction=np.where(rests, 0.0, SMOOTH.direction),
+    )  # fmt: skip
+    return [prepared(ROBOT, SMOOTH), prepared(ROBOT, other)]
+
+
+def test_what_depends_on_several_things_and_what_recordings_differ_by_hold_no_dry_friction():
+    along = two_recordings()
+    scales = scales_of(along)
+    extra = nuisances(ROBOT, along, [(a.nominal, a.nominal) for a in along], BAND, scales)
+    for j in range(N):
+        dry = np.concatenate([BAND.apply(a.recording.direction)[:, j] for a in along])
+        groups = np.isin(extra[0].groups[j], [SCALED.index(name) for name in BESIDE_FRICTION])
+        beside = np.concatenate([e.own[j][:, groups] for e in extra])
+        size = np.linalg.norm(dry) * np.linalg.norm(beside, axis=0).max()
+        assert size > 0.0 and np.abs(dry @ beside).max() < 1e-9 * size
+
+
+def test_what_is_carried_along_a_motion_is_what_was_fitted_there():
+    along = two_recordings()
+    scales = scales_of(along)
+    extra = nuisances(ROBOT, along, [(a.nominal, a.nominal) for a in along], BAND, scales)
+    rng = np.random.default_rng(0)
+    own = [np.where((g >= 0) & (g < SCALED.index("slope")), rng.normal(size=len(g)), 0.0) for g in extra[0].groups]
+    carried = Discrepancy(scales, feature_coefficients(extra[0], own, np.arange(N) > 0))
+    for a, e in zip(along, extra, strict=True):
+        fitted = np.stack([x @ w for x, w in zip(e.own, own, strict=True)], axis=1)
+        made = BAND.apply(carried.along(a.recording, a.nominal))
+        np.testing.assert_allclose(made[:, 1:], fitted[:, 1:], atol=1e-9 * np.abs(fitted).max())
+        assert not made[:, 0].any()

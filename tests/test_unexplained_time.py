@@ -42,15 +42,15 @@ def test_what_comes_before_and_after_stays():
     one, other = (
         Recording(t=t, q=motion, tau=2.0 * motion, joint_names=("a", "b"), source=name, sha256="x") for name in "mn"
     )
-    parts = without([one, other], "m", When(0, 10.0, 12.0, 0.9, 0.9))
+    parts = without([one, other], [("m", 10.0, 12.0)])
     assert parts is not None
     before, after, untouched = parts
     assert before.source == after.source == "m" and before.sha256 == "x" and untouched is other
     assert before.t[-1] < 10.0 and after.t[0] > 12.0 and len(before.t) + len(after.t) > 3500
     np.testing.assert_array_equal(after.tau[:, 0], 2.0 * np.sin(after.t))
-    only = without([one], "m", When(0, 2.5, 12.0, 0.9, 0.9)) or []
+    only = without([one], [("m", 2.5, 12.0)]) or []
     assert [r.t[0] > 12.0 for r in only] == [True]  # half a second before it is nothing
-    assert without([one, one], "m", When(0, 10.0, 12.0, 0.9, 0.9)) is None
+    assert without([one, one], [("m", 10.0, 12.0)]) is None
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,14 @@ from irb140_jax.mismatch.corrected.native import beyond_file
 from irb140_jax.mismatch.experiment_design.nothing_compared import all_open
 from irb140_jax.mismatch.experiment_design.undecided import undecided
 from irb140_jax.mismatch.motion import motion_unseen
-from irb140_jax.mismatch.output.document import Found, document, document_of_nothing, report_views, with_time_left_out
+from irb140_jax.mismatch.output.document import (
+    Found,
+    document,
+    document_of_nothing,
+    report_views,
+    with_joints_blocked,
+    with_time_left_out,
+)
 from irb140_jax.mismatch.output.findings import findings, torque_scale_odds
 from irb140_jax.mismatch.output.provenance import provenance
 from irb140_jax.mismatch.output.servos import by_known_payload, harmful_discrepancy, without_negligible
@@ -26,8 +33,10 @@ from irb140_jax.mismatch.output.store import Result
 from irb140_jax.mismatch.output.views import Views
 from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
 from irb140_jax.mismatch.regression.sufficient_data import Comparison, comparison, payloads_taken_off, too_little
+from irb140_jax.mismatch.result import Diagnosis
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.validation.blocked import Blocked, blocked
 from irb140_jax.mismatch.validation.held_out import HeldOut, Refit, held_out, refitted, unproved
 from irb140_jax.mismatch.validation.testable import reference, visibility
 from irb140_jax.mismatch.validation.undecided_joints import made_worse
@@ -123,6 +132,11 @@ def _diagnosed(
     data = comparison(robot, recordings, config.inertial_uncertainty, progress)
     if reason := too_little(data.smooth, data.band):
         return _nothing_compared(data, config, reason)
+    stops = blocked(robot, data.smooth)
+    if stops and (others := _other_times(stops, data, recordings, whole)):
+        progress("once more, without the times at which something stops a joint")
+        result = _diagnosed(robot, others, config, progress, max(whole, data.seconds))
+        return _said_first(result, with_joints_blocked(result.diagnosis, stops, robot, left_out=True))
     sensors = scatter_by_sensor(robot, data.recordings, data.smooth, data.band)
     ex = _explained(data, sensors, config, progress)
     if data.servo is not None and any(ex.payloads) and PAYLOAD not in data.servo.drive.said:
@@ -155,10 +169,27 @@ def _diagnosed(
     seen = visibility(ex, matters)
     of = Found(data, config.inertial_uncertainty, sensors, ex, proof, found, rest, seen, model, harmful, beyond, stated)
     diagnosis = document(of, provenance(robot, data.recordings, config.options, config.words))
+    diagnosis = with_joints_blocked(diagnosis, stops, robot, left_out=False)
     open_ = undecided(ex, found, seen, matters, data.band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
     motion = motion_unseen(bare, ex, proof, refit.loose, model, beyond)
     return Result(diagnosis, model, report_views(of, diagnosis.notes, motion), open_)
+
+
+def _other_times(
+    stops: Sequence[Blocked], data: Comparison, recordings: Sequence[Recording], whole: float
+) -> list[Recording] | None:
+    """The recordings without the times at which something stops a joint; None where less than half of all stays."""
+    times = [(data.names[i], begin, end) for s in stops for i, begin, end in s.times]
+    kept = data.seconds - sum(end - begin for _, begin, end in times)
+    return without(recordings, times) if 2.0 * kept > max(whole, data.seconds) else None
+
+
+def _said_first(result: Result, diagnosis: Diagnosis) -> Result:
+    """The result with a diagnosis that has more to say."""
+    return dataclasses.replace(
+        result, diagnosis=diagnosis, views=dataclasses.replace(result.views, notes=diagnosis.notes)
+    )
 
 
 def _without_unexplained_time(
@@ -169,21 +200,18 @@ def _without_unexplained_time(
 
     At least half of all that was recorded stays.
     """
-    recorded = sum(float(s.t[-1] - s.t[0]) for s in ex.data.stretches)
+    recorded = data.seconds
     whole, when = max(whole, recorded), common_time(rest, int(proof.judged.sum()), recorded)
     if when is None or 2.0 * (recorded - (when.end - when.begin)) < whole:
         return None
-    if (others := without(recordings, data.names[when.recording], when)) is None:
+    if (others := without(recordings, [(data.names[when.recording], when.begin, when.end)])) is None:
         return None
     said = f"from {when.begin:.4g} to {when.end:.4g} s of {data.names[when.recording]}"
     progress(f"once more, without what nothing explains {said}")
     result = _diagnosed(data.robot, others, config, progress, whole)
     if result.diagnosis.verdict == "undecided":
         return None
-    diagnosis = with_time_left_out(result.diagnosis, said, rest, data)
-    return dataclasses.replace(
-        result, diagnosis=diagnosis, views=dataclasses.replace(result.views, notes=diagnosis.notes)
-    )
+    return _said_first(result, with_time_left_out(result.diagnosis, said, rest, data))
 
 
 def _nothing_compared(data: Comparison, config: DiagnoseConfig, reason: str) -> Result:

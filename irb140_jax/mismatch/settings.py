@@ -102,6 +102,8 @@ CLEARLY_BETTER = float(np.log(100.0))
 MATERIAL_SHARE, MATERIAL_TORQUE = 0.05, 0.02
 # Share of its square that a short time must hold to be told, and share of all recorded time that is short.
 MOST_OF_ERROR, BRIEF = 0.8, 0.2
+# Of what a joint travels, by which a stop at its end gives way.
+STOP_GIVES = 0.01
 # Share of time-shifted copies that may be as predictable.
 SIGNIFICANT = 0.01
 # Share of what time predicts that a competitor which knows the motion must reach to be named instead.

@@ -90,7 +90,8 @@ def _dead_positions(
             near = (recording.t > t[0] - ENDS) & (recording.t < t[-1] + ENDS)
             yield near, np.flatnonzero(touched), (
                 f"q.{name} is frozen at {recording.q[rows, j][0]:.4g} from {t[0]:.4g} s to {t[-1]:.4g} s {by}: its "
-                "channel may be dead there; these rows are left out, of all joints whose torque depends on it")
+                "channel may be dead there, or something blocks the joint; these rows are left out, of all joints "
+                "whose torque depends on it")
             continue
         others = (reach > CHANGED * np.std(here.tau, axis=0)) & (np.arange(robot.n) != j) & (seen.travel > least_travel)
         suffer = bool(np.any(told[others] < WELL))

@@ -31,6 +31,7 @@ from irb140_jax.mismatch.regression.sensor_noise import coarse_positions
 from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.result import Diagnosis, Finding, Fit, Provenance, Unexplained
 from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.validation.blocked import Blocked
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.mismatch.validation.testable import Seen, not_testable, shows_no_friction
 from irb140_jax.mismatch.validation.undecided_joints import torque_size, undecidable
@@ -122,11 +123,32 @@ def with_time_left_out(
         f"Nothing explains most of the torque of {joints} {when}; this time is left out of everything else that is "
         "said, and what is named is of the rest."
     )
-    left = (*(_unexplained(data.robot, s, data.names) for s in brief), *diagnosis.unexplained)
+    return _with_unexplained(diagnosis, [_unexplained(data.robot, s, data.names) for s in brief], [said])
+
+
+def with_joints_blocked(
+    diagnosis: Diagnosis, stops: Sequence[Blocked], robot: Robot, *, left_out: bool
+) -> Diagnosis:
+    """The diagnosis, and which joints something stops; `left_out` where it is of all other times."""
+    left, said = [], []
+    for s in stops:
+        name, (angle, unit) = robot.joint_names[s.joint], ("m", "N") if robot.is_slide[s.joint] else ("rad", "N m")
+        times = f"{len(s.times)} times" if len(s.times) > 1 else "once"
+        where = f"stands still at {s.position:.4g} {angle}, {times}, under up to {s.torque:.3g} {unit} more than the " \
+                f"model needs there, while {s.usual:.3g} {unit} RMS move it elsewhere"  # fmt: skip
+        left.append(Unexplained((name,), f"{name}: {where}: a contact, as with an end stop", s.share, None))
+        said.append(f"{name} {where}: it is blocked, by an end stop, an obstacle or a cable." + (
+            " This time is left out of all else that is said." if left_out else ""))  # fmt: skip
+    return _with_unexplained(diagnosis, left, said) if left else diagnosis
+
+
+def _with_unexplained(diagnosis: Diagnosis, left: Sequence[Unexplained], said: Sequence[str]) -> Diagnosis:
+    """The diagnosis with more that is unexplained, and sentences on it in the first notes and in the summary."""
     silent = diagnosis.verdict in ("no_mismatch", "parameters_only")
     return rounded(dataclasses.replace(
-        diagnosis, verdict="unexplained" if silent else diagnosis.verdict, unexplained=left,
-        notes=(said, *diagnosis.notes), summary=f"{diagnosis.summary} {said}",
+        diagnosis, verdict="unexplained" if silent else diagnosis.verdict,
+        unexplained=(*left, *diagnosis.unexplained), notes=(*said, *diagnosis.notes),
+        summary=" ".join([diagnosis.summary, *said]),
     ))  # fmt: skip
 
 

@@ -4,10 +4,12 @@ Four zero-mean blocks of features a joint, each with a size of its own: what dep
 depends on speed alone, what depends on several of position, speed, direction and load, and what friction may do
 differently around a change of direction, by bristles or lateness.  None holds a term that a named effect consists of
 (a constant, the direction itself, position, speed, acceleration, load, how fast the load changes): the discrepancy
-stands for what no law explains, not for the laws.
+stands for what no law explains, not for the laws.  Functions of several of those may resemble dry friction where a
+joint moves little, so they hold none of it over the recordings.
 
-Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(3), 2001; the low rank as in Rasmussen
-and Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
+Source: Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63(3), 2001; orthogonal to laws as in
+Plumlee, Bayesian calibration of inexact computer models, JASA 112(519), 2017; the low rank as in Rasmussen and
+Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
 """
 
 import dataclasses
@@ -21,7 +23,7 @@ from irb140_jax.recordings.condition import Conditioned
 
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
-FEATURES = 80  # of all blocks
+FEATURES = 81  # of all blocks, and dry friction
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,8 +32,8 @@ class Discrepancy:
 
     Attributes:
         scales: Sizes of the recordings that it was found in.
-        coefficients: Of each joint's features, block by block [N m or N], zero where nothing is carried, shape
-            (n, FEATURES).
+        coefficients: Of each joint's features, block by block, and of its direction [N m or N], zero where nothing is
+            carried, shape (n, FEATURES).
     """
 
     scales: Scales
@@ -46,7 +48,8 @@ class Discrepancy:
         """
         out = np.zeros_like(load)
         for j in np.flatnonzero(self.coefficients.any(axis=1)):
-            out[:, j] = np.concatenate(features(r, load, self.scales, int(j)), axis=1) @ self.coefficients[j]
+            blocks = (*features(r, load, self.scales, int(j)), r.direction[:, [j]])
+            out[:, j] = np.concatenate(blocks, axis=1) @ self.coefficients[j]
         return out
 
     def on(self, joints: np.ndarray) -> "Discrepancy | None":

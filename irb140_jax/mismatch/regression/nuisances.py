@@ -22,6 +22,8 @@ COMMON = 3  # nuisance parameters that all joints share, beside those of servos
 INSTRUMENT, DRIVE = -1, -2
 # Blocks of a joint whose size is learned from the recordings.
 SCALED = ("position", "speed", "smooth", "reversal", "slope")
+# Those of them that would stand in the place of dry friction where a joint moves little or in few recordings.
+BESIDE_FRICTION = ("smooth", "slope")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,12 +36,14 @@ class Nuisances:
         own: Of each joint, fixed widths first, then the blocks `SCALED`; shape (R, D_j) each.
         groups: Which block each own column belongs to: `INSTRUMENT`, `DRIVE` or an index into `SCALED`; (D_j,) each.
         units: What each own column's feature was multiplied by, shape (D_j,) each.
+        dry: How much dry friction each own column holds beside that, shape (D_j,) each.
     """
 
     common: np.ndarray
     own: tuple[np.ndarray, ...]
     groups: tuple[np.ndarray, ...]
     units: tuple[np.ndarray, ...]
+    dry: tuple[np.ndarray, ...]
 
 
 def feature_coefficients(extra: Nuisances, own: Sequence[np.ndarray], joints: np.ndarray) -> np.ndarray:
@@ -50,10 +54,11 @@ def feature_coefficients(extra: Nuisances, own: Sequence[np.ndarray], joints: np
         own: Coefficients of each joint's own columns.
         joints: At which joints, shape (n,).
     """
-    return np.stack([
-        np.where(use, (v * u)[(g >= 0) & (g < SCALED.index("slope"))], 0.0)
-        for use, v, g, u in zip(joints, own, extra.groups, extra.units, strict=True)
-    ])  # fmt: skip
+    out = []
+    for use, v, g, u, dry in zip(joints, own, extra.groups, extra.units, extra.dry, strict=True):
+        mine = (g >= 0) & (g < SCALED.index("slope"))
+        out.append(np.append((v * u)[mine], dry[mine] @ v[mine]) * use)
+    return np.stack(out)
 
 
 def payload_columns(robot: Robot, along: Sequence[Prepared]) -> list[np.ndarray]:
@@ -96,6 +101,7 @@ def nuisances(
     """
     n, count = robot.n, len(along)
     raw: list[list[list[np.ndarray]]] = []  # recording, joint, block
+    turned: list[np.ndarray] = []  # recording
     commons, placed = [], payload_columns(robot, along)
     for r, (a, (load, total)) in enumerate(zip(along, torques, strict=True)):
         motion, dt = a.recording, float(np.mean(np.diff(a.recording.t)))
@@ -114,6 +120,7 @@ def nuisances(
         common = np.stack([settings.GAIN_COMMON * gain, early * rate, 2.0 * bend], axis=-1)
         commons.append(band.apply(np.concatenate([common, *held, common_columns(motion, own)], axis=-1)))
         joints = []
+        turned.append(band.apply(late(at, motion.direction, np.arange(n), dt)))
         for j in range(n):
             wide = np.hypot(settings.GAIN_JOINT, scale_width(motion, j))
             fixed = (wide * gain[:, j], own_delay * rate[:, j], rotor[:, j], bend[:, j], bias[:, j])
@@ -124,9 +131,10 @@ def nuisances(
             joints.append([band.apply(b) for b in (fixed, *scaled)])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
-    units = []
+    units, dry = [], []
     for j in range(n):
-        factors = [np.ones(raw[0][j][0].shape[1])]
+        factors, parts = [np.ones(raw[0][j][0].shape[1])], [np.zeros(raw[0][j][0].shape[1])]
+        moved = sum(float(x[:, j] @ x[:, j]) for x in turned)
         for block, name in enumerate(SCALED, 1):
             power = sum(np.sum(raw[r][j][block] ** 2, axis=0) for r in range(count))
             rows = sum(len(raw[r][j][block]) for r in range(count))
@@ -138,12 +146,17 @@ def nuisances(
             size = scales.torque[j] / (1.0 if level else np.sqrt(width))
             factor = np.where(gone, 0.0, size / np.where(gone, 1.0, 1.0 if level else rms))
             factors.append(factor)
+            alike = sum(x[:, j] @ raw[r][j][block] for r, x in enumerate(turned)) / max(moved, 1e-300)
+            parts.append(-alike * factor * (name in BESIDE_FRICTION))
             for r in range(count):
-                raw[r][j][block] = raw[r][j][block] * factor
+                raw[r][j][block] = raw[r][j][block] * factor + np.outer(turned[r][:, j], parts[-1])
         units.append(np.concatenate(factors))
+        dry.append(np.concatenate(parts))
         group = np.repeat(np.arange(INSTRUMENT, len(SCALED)), [b.shape[1] for b in raw[0][j]])
         group[len(FIXED) : raw[0][j][0].shape[1]] = DRIVE
         for r in range(count):
             out[r][0].append(np.concatenate(raw[r][j], axis=1))
             out[r][1].append(group)
-    return [Nuisances(c, tuple(own), tuple(g), tuple(units)) for c, (own, g) in zip(commons, out, strict=True)]
+    return [
+        Nuisances(c, tuple(own), tuple(g), tuple(units), tuple(dry)) for c, (own, g) in zip(commons, out, strict=True)
+    ]

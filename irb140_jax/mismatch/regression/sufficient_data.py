@@ -48,6 +48,11 @@ class Comparison:
         return [r.source for r in self.recordings]
 
     @property
+    def seconds(self) -> float:
+        """How long all of them are together."""
+        return sum(float(r.t[-1] - r.t[0]) for r in self.smooth)
+
+    @property
     def servo(self) -> Commanded | None:
         """Commands and drive, where the recordings held these in place of torque."""
         return self.smooth[0].servo

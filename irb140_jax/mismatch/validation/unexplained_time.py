@@ -41,22 +41,31 @@ def mostly_unexplained(rest: Sequence[Structure]) -> list[Structure]:
     return [s for s in rest if s.when is not None and s.when.of_torque > settings.LARGE_ERROR]
 
 
-def without(recordings: Sequence[Recording], name: str, when: When) -> list[Recording] | None:
-    """The recordings without that time of the one of this name; None where the name is not one's alone.
+def without(
+    recordings: Sequence[Recording], times: Sequence[tuple[str, float, float]]
+) -> list[Recording] | None:
+    """The recordings without some times; None where nothing is left, or a name of a recording is not one's alone.
 
-    What comes before and what comes after are recordings of their own, if there is anything of them.
+    What comes before, between and after is a recording of its own each, if there is anything of it.
+
+    Args:
+        recordings: All of them.
+        times: Name of a recording, begin and end in the time of its log [s].
     """
-    if [r.source for r in recordings].count(name) != 1:
+    names = [r.source for r in recordings]
+    if any(names.count(name) != 1 for name, *_ in times):
         return None
     out = []
     for r in recordings:
-        if r.source != name:
+        stays = np.ones(len(r.t), dtype=bool)
+        for name, begin, end in times:
+            inside = (r.t >= begin - settings.EVENT_MARGIN) & (r.t < end + settings.EVENT_MARGIN)
+            stays &= (r.source != name) | ~inside
+        if stays.all():
             out.append(r)
             continue
-        before = int(np.searchsorted(r.t, when.begin - settings.EVENT_MARGIN))
-        after = int(np.searchsorted(r.t, when.end + settings.EVENT_MARGIN))
-        for rows in (slice(0, before), slice(after, len(r.t))):
-            part = rows_of(r, rows)
+        for first, last in np.flatnonzero(np.diff(np.concatenate([[False], stays, [False]]))).reshape(-1, 2):
+            part = rows_of(r, slice(first, last))
             if len(part.t) > 1 and part.t[-1] - part.t[0] > settings.FEWEST_SECONDS:
                 out.append(dataclasses.replace(part, sha256=r.sha256, path=r.path))
     return out or None

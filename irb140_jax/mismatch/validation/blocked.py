@@ -1,0 +1,78 @@
+"""Joints that stand still at an end of their range under far more torque than moves them: against a stop, say.
+
+All else in a diagnosis leaves out rows in which a joint rests, because dry friction is undetermined there.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from irb140_jax.mismatch import settings
+from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.glance import SAMPLES
+from irb140_jax.recordings.torques import nominal_torques
+from irb140_jax.robot import Robot
+
+
+class Blocked(NamedTuple):
+    """A joint that something stops.
+
+    Attributes:
+        joint: Index.
+        position: Where it stands [rad or m].
+        times: When it is there: index of the recording, begin and end in the time of its log [s].
+        torque: The most that it takes there beyond what the nominal model needs [N m or N].
+        usual: Torque that moves it, root mean square [N m or N].
+        share: Of the square of its torque in all rows.
+    """
+
+    joint: int
+    position: float
+    times: tuple[tuple[int, float, float], ...]
+    torque: float
+    usual: float
+    share: float
+
+
+def blocked(robot: Robot, recordings: Sequence[Conditioned]) -> list[Blocked]:
+    """Joints that something stops at the lower or upper end of what they travel in the recordings.
+
+    Args:
+        robot: The nominal model, n joints.
+        recordings: Conditioned, T samples each.
+    """
+    out = []
+    for j in range(robot.n):
+        moving = np.concatenate([r.tau[r.usable[:, j], j] for r in recordings])
+        if not len(moving):
+            continue
+        much = settings.ABOVE_NOISE * float(np.sqrt(np.mean(moving**2)))
+        torque = np.concatenate([r.tau[r.recorded[:, j], j] for r in recordings])
+        travelled = np.concatenate([r.q[r.recorded[:, j], j] for r in recordings])
+        low, high = float(travelled.min()), float(travelled.max())
+        for end, way in ((low, -1.0), (high, 1.0)):
+            times, held = [], []
+            for i, r in enumerate(recordings):
+                there = np.abs(r.q[:, j] - end) < settings.STOP_GIVES * (high - low)
+                stands = there & r.recorded[:, j] & ~r.usable[:, j] & (way * r.tau[:, j] > much)
+                for first, last in _runs(there):
+                    rows = first + np.flatnonzero(stands[first:last])
+                    if len(rows) * (r.t[1] - r.t[0]) > settings.EVENT_MARGIN:
+                        times.append((i, float(r.t[first]), float(r.t[last - 1])))
+                        held.append(np.stack([x[rows] for x in (r.q, r.qd, r.qdd, r.tau)]))
+            if not times:
+                continue
+            rows = np.concatenate(held, axis=1)
+            q, qd, qdd, tau = rows[:, np.linspace(0, rows.shape[1] - 1, SAMPLES).astype(int)]
+            beyond = way * (tau - nominal_torques(robot, q, qd, qdd).total)[:, j]
+            if np.median(beyond) > much:
+                share = float(np.sum(rows[3, :, j] ** 2) / np.sum(torque**2))
+                usual = much / settings.ABOVE_NOISE
+                out.append(Blocked(j, end, tuple(times), float(beyond.max()), usual, share))
+    return out
+
+
+def _runs(there: np.ndarray) -> np.ndarray:
+    """First row and the row after the last of every run of rows, shape (runs, 2)."""
+    return np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]))).reshape(-1, 2)
