@@ -32,7 +32,7 @@ class Config:
 
 def named(findings: list[dict]) -> str:
     """Findings in one line, with their numbers."""
-    number = lambda k, v: f"{k} {v['value']:.3g} ± {v['std']:.1g} {v['unit']}".rstrip(" 1")  # noqa: E731
+    number = lambda k, v: f"{k} {v['value']:.3g} ± {v['std']:.1g} {v['unit']}".removesuffix(" 1")  # noqa: E731
     return "; ".join(
         f"{f['effect']} ({', '.join(number(k, v) for k, v in f['parameters'].items())})" for f in findings
     )

@@ -296,12 +296,14 @@ def test_progress_is_told_in_plain_lines_where_stderr_is_no_terminal(recording, 
 
 
 def test_the_share_done_and_the_time_left_are_told_as_far_as_they_are_known():
-    now = iter([0.0, 20.0, 100.0, 160.0])
+    now = iter([0.0, 20.0, 100.0, 160.0, 170.0, 180.0])
     share = Share({"second step": 0.1, "third step": 0.5, "fourth step": 0.95}, lambda: next(now))
     assert share.with_share("the first step") == "the first step"
     assert share.with_share("the second step") == "the second step (10% done, about 3 min left)"
     assert share.with_share("the third step again") == "the third step again (50% done, about 2 min left)"
     assert share.with_share("the fourth step") == "the fourth step (95% done, some seconds left)"
+    assert share.with_share("once more, without some time") == "once more, without some time"
+    assert share.with_share("the second step") == "the second step (10% done, about 2 min left)"
 
 
 def test_the_steps_of_which_the_share_is_known_are_those_that_a_diagnosis_tells():

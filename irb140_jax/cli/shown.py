@@ -56,7 +56,12 @@ class Share:
         self._steps, self._clock, self._start, self._share = steps, clock, clock(), 0.0
 
     def with_share(self, sentence: str) -> str:
-        """The sentence, with the share done and the time left, as far as anything is known of them."""
+        """The sentence, with the share done and the time left, as far as anything is known of them.
+
+        What is done "once more" begins anew.
+        """
+        if sentence.startswith("once more"):
+            self._start, self._share = self._clock(), 0.0
         begun = [share for words, share in self._steps.items() if words in sentence]
         self._share = max([self._share, *begun])
         if not self._share:

@@ -89,9 +89,11 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     A motion that all but alone moves some joint, or all but alone holds what a finding does, is left out block by
     block, too: without it nothing is known there, and a wall that is touched once would drown all else.
     """
+    recording = recordings_of_blocks(ex)
     out, weight = [], np.vstack([np.stack([g.rows for g in ex.by_block.joints]), _energy(ex, ex.chosen)])
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
-    motion, number = motions_of_blocks(ex), np.tile(np.arange(settings.BLOCKS), len(ex.data.stretches))
+    of_recording = np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches])
+    motion, number = of_recording[recording], np.tile(np.arange(settings.BLOCKS), len(ex.data.stretches))
     for m in dict.fromkeys(motion.tolist()):
         mine = motion == m
         alone = np.max(weight[:, mine].sum(axis=1)) > settings.ALONE
@@ -102,12 +104,6 @@ def folds(ex: Explanation) -> list[np.ndarray]:
 def recordings_of_blocks(ex: Explanation) -> np.ndarray:
     """Recording of each block, shape (blocks,)."""
     return np.repeat([s.recording for s in ex.data.stretches], settings.BLOCKS)
-
-
-def motions_of_blocks(ex: Explanation) -> np.ndarray:
-    """Number of the motion of each block, the same of recordings that repeat it, shape (blocks,)."""
-    motions = [s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches]
-    return np.repeat(motions, settings.BLOCKS)
 
 
 def _energy(ex: Explanation, chosen: tuple[int, ...]) -> np.ndarray:
@@ -245,24 +241,18 @@ def unproved(ex: Explanation) -> list[Site]:
 
     Evidence trusts that some law is true.  Where none of them knows what the model errs by, one may fit all the same,
     and motions that the fit did not see tell: by how many nats they are less probable with it, each joint's error as
-    large as it is there, and with what it says nothing of.  Motions may differ in that by more than all of it, so one
-    standard error of the sum is taken off (Breiman, Friedman, Olshen and Stone, Classification and Regression Trees,
-    1984, sec. 3.4.3).  Blocks of one motion are no other motion: where there are no others, nothing is taken away.
+    large as it is there, and with what it says nothing of.  Blocks of one motion are no other motion: where there are
+    no others, nothing is taken away.
     """
-    left_out, recording, motion = folds(ex), recordings_of_blocks(ex), motions_of_blocks(ex)
+    left_out, recording = folds(ex), recordings_of_blocks(ex)
     if all(np.isin(recording[~fold], recording[fold]).any() for fold in left_out):
         return []
-    rows, against = np.array([float(g.rows.sum()) for g in ex.by_block.joints]), {}
-    left_by = np.unique(motion)[:, None] == [motion[fold][0] for fold in left_out]
-    whole = _unseen_errors(ex, ex.chosen, left_out)
+    rows = np.array([float(g.rows.sum()) for g in ex.by_block.joints])
+    whole, against = _unseen_errors(ex, ex.chosen, left_out), {}
     for i in filter(lambda i: _is_rare(ex, i), ex.chosen):
         without = _unseen_errors(ex, ex.others(i), left_out)
-        more, less = whole.sum(axis=0) + 1e-300, without.sum(axis=0) + 1e-300
-        nats = 0.5 * rows * np.log(more / less)
-        share = (whole - without) / np.where(more == less, 1.0, more - less)
-        of_motions = left_by @ share @ nats
-        against[i] = float(nats.sum()) + float(ex.space.lost([i], ex.hyper)[0])
-        against[i] -= float(np.sqrt(len(of_motions)) * np.std(of_motions, ddof=1))
+        against[i] = 0.5 * float(np.sum(rows * np.log((whole + 1e-300) / (without + 1e-300))))
+        against[i] += float(ex.space.lost([i], ex.hyper)[0])
     most, worst = np.log(settings.NAMED / (1.0 - settings.NAMED)), sorted(against, key=lambda i: -against[i])[:1]
     return [site_of(ex.data.candidates[i]) for i in worst if against[i] > most]
 
@@ -274,11 +264,11 @@ def _is_rare(ex: Explanation, index: int) -> bool:
 
 
 def _unseen_errors(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> np.ndarray:
-    """Whitened squared error of a set on data that its fit did not see, by fold and joint, shape (folds, n)."""
+    """Whitened squared error of a set on data that its fit did not see, by joint, shape (n,)."""
     space, energy = ex.by_block, _energy(ex, chosen)
-    error, columns = np.zeros((len(left_out), len(space.joints))), space.with_y(space.set_columns(chosen))
+    error, columns = np.zeros(len(space.joints)), space.with_y(space.set_columns(chosen))
     seen = ex.posterior(chosen, instrument=False).mean
-    for f, fold in enumerate(left_out):
+    for fold in left_out:
         only = _only_here(ex, chosen, energy, fold)
         mean = np.where(only, seen, ex.posterior(chosen, fold, instrument=False).mean)
         w = np.zeros(len(columns))
@@ -288,7 +278,7 @@ def _unseen_errors(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.n
             at, drive = place[columns], np.flatnonzero(g.groups == DRIVE)
             own = seen_by.own(j, ex.hyper[j], columns[:-1], w[:-1], instrument=False)[drive]
             v, at = np.concatenate([own, w[at >= 0]]), np.concatenate([drive, at[at >= 0] + len(g.groups)])
-            error[f, j] = float(v @ g.blocks[fold].sum(axis=0)[np.ix_(at, at)] @ v)
+            error[j] += float(v @ g.blocks[fold].sum(axis=0)[np.ix_(at, at)] @ v)
     return error
 
 
