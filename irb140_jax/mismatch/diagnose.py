@@ -136,7 +136,8 @@ def _diagnosed(
     if stops and (others := _other_times(stops, data, recordings, whole)):
         progress("once more, without the times at which something stops a joint")
         result = _diagnosed(robot, others, config, progress, max(whole, data.seconds))
-        return _said_first(result, with_joints_blocked(result.diagnosis, stops, robot, left_out=True))
+        if result.diagnosis.verdict != "undecided":
+            return _of_all(data, config, result, with_joints_blocked(result.diagnosis, stops, robot, left_out=True))
     sensors = scatter_by_sensor(robot, data.recordings, data.smooth, data.band)
     ex = _explained(data, sensors, config, progress)
     if data.servo is not None and any(ex.payloads) and PAYLOAD not in data.servo.drive.said:
@@ -185,11 +186,12 @@ def _other_times(
     return without(recordings, times) if 2.0 * kept > max(whole, data.seconds) else None
 
 
-def _said_first(result: Result, diagnosis: Diagnosis) -> Result:
-    """The result with a diagnosis that has more to say."""
-    return dataclasses.replace(
-        result, diagnosis=diagnosis, views=dataclasses.replace(result.views, notes=diagnosis.notes)
-    )
+def _of_all(data: Comparison, config: DiagnoseConfig, result: Result, diagnosis: Diagnosis) -> Result:
+    """The result of some of the time of recordings with a diagnosis that says so, as one of the whole recordings."""
+    origin = provenance(data.robot, data.recordings, config.options, config.words)
+    diagnosis = dataclasses.replace(diagnosis, provenance=origin)
+    views = dataclasses.replace(result.views, notes=diagnosis.notes)
+    return dataclasses.replace(result, diagnosis=diagnosis, views=views)
 
 
 def _without_unexplained_time(
@@ -211,7 +213,7 @@ def _without_unexplained_time(
     result = _diagnosed(data.robot, others, config, progress, whole)
     if result.diagnosis.verdict == "undecided":
         return None
-    return _said_first(result, with_time_left_out(result.diagnosis, said, rest, data))
+    return _of_all(data, config, result, with_time_left_out(result.diagnosis, said, rest, data))
 
 
 def _nothing_compared(data: Comparison, config: DiagnoseConfig, reason: str) -> Result:

@@ -46,7 +46,7 @@ def without(
 ) -> list[Recording] | None:
     """The recordings without some times; None where nothing is left, or a name of a recording is not one's alone.
 
-    What comes before, between and after is a recording of its own each, if there is anything of it.
+    What comes before, between and after is a recording of its own each, if there is anything of it, named for its time.
 
     Args:
         recordings: All of them.
@@ -67,5 +67,6 @@ def without(
         for first, last in np.flatnonzero(np.diff(np.concatenate([[False], stays, [False]]))).reshape(-1, 2):
             part = rows_of(r, slice(first, last))
             if len(part.t) > 1 and part.t[-1] - part.t[0] > settings.FEWEST_SECONDS:
-                out.append(dataclasses.replace(part, sha256=r.sha256, path=r.path))
+                name = f"{r.source} ({part.t[0]:.4g} to {part.t[-1]:.4g} s)"
+                out.append(dataclasses.replace(part, source=name))
     return out or None
