@@ -85,8 +85,9 @@ class Unexplained:
     Attributes:
         joints: Names of the joints where it is.
         where: How large it is and what it depends on, one sentence.
-        share: Part of the remaining residual's variance that is predictable on unseen data.
-        p_value: Share of time-shifted copies of the residual that are as predictable.
+        share: Part of the remaining residual's variance that is predictable on unseen data; None of a joint that
+            something stops.
+        p_value: Share of time-shifted copies of the residual that are as predictable; None likewise.
     """
 
     joints: tuple[str, ...]

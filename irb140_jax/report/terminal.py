@@ -89,8 +89,9 @@ def _where(findings: Sequence[Finding]) -> Iterator[str]:
 def _unexplained(rests: Sequence[Unexplained], joints: Sequence[str]) -> Iterator[str]:
     """What has no name."""
     for rest in rests:
-        names, share = escape(text.joint_list(rest.joints, joints)), text.percent(rest.share)
-        yield f"[bold]Unexplained[/] on {names} ({share} of what is left): {escape(rest.where)}"
+        names = escape(text.joint_list(rest.joints, joints))
+        share = "" if rest.share is None else f" ({text.percent(rest.share)} of what is left)"
+        yield f"[bold]Unexplained[/] on {names}{share}: {escape(rest.where)}"
 
 
 def _fit(fit: Mapping[str, Fit], views: Views) -> Table:

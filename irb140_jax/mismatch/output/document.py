@@ -136,7 +136,7 @@ def with_joints_blocked(
         times = f"{len(s.times)} times" if len(s.times) > 1 else "once"
         where = f"stands still at {s.position:.4g} {angle}, {times}, under up to {s.torque:.3g} {unit} more than the " \
                 f"model needs there, while {s.usual:.3g} {unit} RMS move it elsewhere"  # fmt: skip
-        left.append(Unexplained((name,), f"{name}: {where}: a contact, as with an end stop", s.share, None))
+        left.append(Unexplained((name,), f"{name}: {where}: a contact, as with an end stop", None, None))
         said.append(f"{name} {where}: it is blocked, by an end stop, an obstacle or a cable." + (
             " This time is left out of all else that is said." if left_out else ""))  # fmt: skip
     return _with_unexplained(diagnosis, left, said) if left else diagnosis

@@ -24,7 +24,6 @@ class Blocked(NamedTuple):
         times: When it is there: index of the recording, begin and end in the time of its log [s].
         torque: The most that it takes there beyond what the nominal model needs [N m or N].
         usual: Torque that moves it, root mean square [N m or N].
-        share: Of the square of its torque in all rows.
     """
 
     joint: int
@@ -32,7 +31,6 @@ class Blocked(NamedTuple):
     times: tuple[tuple[int, float, float], ...]
     torque: float
     usual: float
-    share: float
 
 
 def blocked(robot: Robot, recordings: Sequence[Conditioned]) -> list[Blocked]:
@@ -48,7 +46,6 @@ def blocked(robot: Robot, recordings: Sequence[Conditioned]) -> list[Blocked]:
         if not len(moving):
             continue
         much = settings.ABOVE_NOISE * float(np.sqrt(np.mean(moving**2)))
-        torque = np.concatenate([r.tau[r.recorded[:, j], j] for r in recordings])
         travelled = np.concatenate([r.q[r.recorded[:, j], j] for r in recordings])
         low, high = float(travelled.min()), float(travelled.max())
         for end, way in ((low, -1.0), (high, 1.0)):
@@ -67,9 +64,7 @@ def blocked(robot: Robot, recordings: Sequence[Conditioned]) -> list[Blocked]:
             q, qd, qdd, tau = rows[:, np.linspace(0, rows.shape[1] - 1, SAMPLES).astype(int)]
             beyond = way * (tau - nominal_torques(robot, q, qd, qdd).total)[:, j]
             if np.median(beyond) > much:
-                share = float(np.sum(rows[3, :, j] ** 2) / np.sum(torque**2))
-                usual = much / settings.ABOVE_NOISE
-                out.append(Blocked(j, end, tuple(times), float(beyond.max()), usual, share))
+                out.append(Blocked(j, end, tuple(times), float(beyond.max()), much / settings.ABOVE_NOISE))
     return out
 
 
