@@ -15,7 +15,7 @@ from rich.console import Console
 
 from irb140_jax.cli.parsing import parsed
 from irb140_jax.mismatch.output.views import Views
-from irb140_jax.mismatch.result import Diagnosis, Estimate, Fit
+from irb140_jax.mismatch.result import Diagnosis, Estimate, Fit, Unexplained
 from irb140_jax.report import html_report, print_diagnosis, print_reveal, revealed, svg, svg_maps, text
 from irb140_jax.report.next_steps import next_steps
 from irb140_jax.report.overview import overview
@@ -98,7 +98,9 @@ def test_every_joint_has_its_row_of_errors_its_maps_and_its_torque(diagnosis, vi
 
 
 def test_the_first_table_has_every_finding_at_its_joints_and_what_is_not_judged(diagnosis, views):
-    judged = dataclasses.replace(diagnosis, fit=diagnosis.fit | {"joint4": Fit()})
+    stop = Unexplained(("joint6",), "joint6: stands still", None, None)
+    left = (*diagnosis.unexplained, stop)
+    judged = dataclasses.replace(diagnosis, fit=diagnosis.fit | {"joint4": Fit()}, unexplained=left)
     units = dict.fromkeys(views.joints, "N m")
     rows = {row["name"]: row["cells"] for row in overview(judged, views.joints, units)}
     values = {name: [cell["value"] for cell in cells] for name, cells in rows.items()}
@@ -106,6 +108,7 @@ def test_the_first_table_has_every_finding_at_its_joints_and_what_is_not_judged(
     assert values["transmission coupling"][4:] == ["2.310 ± 0.040"] * 2
     assert rows["stribeck friction"][1]["more"] == "N m · 97 %, 1 alternative"
     assert rows["stribeck friction"][1]["kind"] == "sure open" and rows["transmission coupling"][4]["kind"] == "sure"
+    assert values["blocked"] == [""] * 5 + ["yes"]
     assert values["error left"][3] == "not judged"
     assert "joint4 not judged" in Page(html_report(judged, views)).visible
 

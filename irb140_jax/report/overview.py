@@ -9,7 +9,7 @@ SURE = 0.95  # probability from which a cell is drawn as certain
 
 
 def overview(diagnosis: Diagnosis, joints: Sequence[str], units: Mapping[str, str]) -> list[dict]:
-    """Rows of the table: one for each effect, then what has no name, then the error left over the noise.
+    """Rows of the table: one for each effect, then what has no name or is blocked, then the error left over the noise.
 
     Args:
         diagnosis: The diagnosis.
@@ -26,6 +26,9 @@ def overview(diagnosis: Diagnosis, joints: Sequence[str], units: Mapping[str, st
             rows.setdefault(text.words(finding.effect), {})[joint] = _found(finding)
     for rest in diagnosis.unexplained:
         for joint in rest.joints:
+            if rest.share is None:
+                rows.setdefault("blocked", {})[joint] = {"value": "yes", "more": "", "kind": "rest"}
+                continue
             cell = {"value": text.percent(rest.share), "more": "of the rest", "kind": "rest"}
             rows.setdefault("without a name", {})[joint] = cell
     left = {joint: _left(diagnosis.fit.get(joint), units.get(joint, "")) for joint in joints}
