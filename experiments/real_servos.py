@@ -3,9 +3,9 @@
     python experiments/real_servos.py [--machines unitree_go2 bam_xl330 so101] [--out results]
 
 unitree_go2: each leg by itself, on two splits; torque of the servo law is what is judged, as in the baseline that came
-with the data.  so101: Kp as published for the servo and known
-to 40 %, no Kd, five joints; its position error is not judged, for that needs the loop simulated.
-bam_xl330: the duty cycle that was logged is withheld.  Every machine's result is a file of its own.
+with the data.  so101: Kp as published for the servo and known to 40 %, no Kd, five joints; its positions are simulated
+from the commands of the motions that are kept back.  bam_xl330: the duty cycle that was logged is withheld, and so it
+is judged.  Every machine's result is a file of its own.
 """
 
 import dataclasses

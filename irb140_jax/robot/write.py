@@ -6,8 +6,8 @@ from irb140_jax.robot.drive import ServoGains
 from irb140_jax.robot.robot import Robot
 from irb140_jax.robot.tree import children
 
-# By default MuJoCo's dry friction lets a joint that should stick creep, some 0.01 rad/s under half of its level.  As
-# stiff as can be written, and as quick as the time step allows (MuJoCo takes no less than two steps), it holds.
+# By default MuJoCo's dry friction lets a joint that should stick creep (`tests/test_motion.py`: half a radian in ten
+# seconds).  As stiff as can be written, and as quick as the time step allows (no less than two steps), it holds.
 STICKS = 'solreffriction="0.0001 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"'
 
 

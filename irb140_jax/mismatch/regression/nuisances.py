@@ -146,10 +146,12 @@ def nuisances(
             size = scales.torque[j] / (1.0 if level else np.sqrt(width))
             factor = np.where(gone, 0.0, size / np.where(gone, 1.0, 1.0 if level else rms))
             factors.append(factor)
-            alike = sum(x[:, j] @ raw[r][j][block] for r, x in enumerate(turned)) / max(moved, 1e-300)
-            parts.append(-alike * factor * (name in BESIDE_FRICTION))
+            parts.append(np.zeros(len(factor)))
+            if name in BESIDE_FRICTION:
+                alike = sum(x[:, j] @ raw[r][j][block] for r, x in enumerate(turned))
+                parts[-1] = -alike * factor / max(moved, 1e-300)
             for r in range(count):
-                raw[r][j][block] = raw[r][j][block] * factor + np.outer(turned[r][:, j], parts[-1])
+                raw[r][j][block] = raw[r][j][block] * factor + turned[r][:, [j]] * parts[-1]
         units.append(np.concatenate(factors))
         dry.append(np.concatenate(parts))
         group = np.repeat(np.arange(INSTRUMENT, len(SCALED)), [b.shape[1] for b in raw[0][j]])
