@@ -228,7 +228,7 @@ def pendulum(result: dict) -> list[str]:
         f"Alternatives: {', '.join(sorted(others)) or 'none'}. On unseen data the error goes from",
         f"{fit['rmse_nominal']:.3g} N m (model as given) over {fit['rmse_refit']:.3g} (inertials refitted) to",
         f"{fit['rmse_corrected']:.3g}.",
-        "Simulated from the goals with gain 400, which were kept back, `corrected.xml` is off by",
+        "Simulated from the goals with gain 400, which were kept back, the corrected model is off by",
         f"{result['position_error']['corrected']:.4f} rad (mean absolute error; the goal is {PUBLISHED_BY_POSITION}),",
         f"the model as given by {result['position_error']['nominal']:.4f}.", *gain, "",
     ]  # fmt: skip

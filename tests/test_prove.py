@@ -86,7 +86,7 @@ def test_a_finding_is_worth_on_unseen_data_what_is_lost_without_it(alike):
 
 def test_a_findings_sentence_says_what_it_is_compared_with_on_unseen_data(alike):
     # The table of errors compares with inertials near those stated, so the same share of its errors would be wrong.
-    for finding in findings(robot(), alike):
+    for finding in findings(robot(), alike, {}):
         share, said = re.findall(r"adding it removes ([\d.]+) % of the squared error that (.*)", finding.certain)[0]
         assert float(share) == pytest.approx(100.0 * (finding.evidence.heldout_gain or 0.0), abs=0.5)
         assert said.startswith("inertial parameters of any size and the other findings leave on unseen data without it")

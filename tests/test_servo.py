@@ -19,6 +19,7 @@ from irb140_jax.cli import main
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import DiagnoseConfig, diagnose, save
+from irb140_jax.mismatch.corrected.native import native_robot
 from irb140_jax.recordings import Drive, Payload, drive_of_model, read_recording, stated_drive, write_recording
 from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.servo import with_servo_torques, with_torque
@@ -381,12 +382,16 @@ def test_the_file_has_servos_that_move_it_as_our_own_dynamics_with_their_law(rub
     save(rubbing, tmp_path)
     dt = 1e-4  # MuJoCo's step is of first order
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "corrected.xml"))
-    np.testing.assert_allclose(drive_of_model(tmp_path / "corrected.xml", JOINTS).kp, drive_of(rubbing.model).kp)
+    # How strong the servos are by the motion is in the gains of the file.
+    stronger = np.asarray(native_robot(rubbing.model).gear / rubbing.model.robot.gear)
+    drive = drive_of(rubbing.model)
+    kp, kd = stronger * drive.kp, stronger * drive.kd
+    np.testing.assert_allclose(drive_of_model(tmp_path / "corrected.xml", JOINTS).kp, kp)
+    assert (np.abs(stronger - 1.0) < 0.05).all()
     model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, dt
     model.dof_frictionloss[:] = 0.0  # a step of its own in either simulation
     arm = irb.load_robot(tmp_path / "corrected.xml")
     arm = eqx.tree_at(lambda r: r.frictionloss, arm, jnp.zeros(2))
-    kp, kd = drive_of(rubbing.model).kp, drive_of(rubbing.model).kd
     times = jnp.arange(0.0, 1.0, dt)
     wanted = 0.5 * jnp.sin(jnp.stack([4.0 * times, 6.0 * times + 1.0], axis=1))
 

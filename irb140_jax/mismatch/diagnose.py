@@ -17,7 +17,7 @@ from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file
 from irb140_jax.mismatch.experiment_design.nothing_compared import all_open
 from irb140_jax.mismatch.experiment_design.undecided import undecided
-from irb140_jax.mismatch.motion import motion_unseen
+from irb140_jax.mismatch.motion import MotionFit, fitted_in_motion, motion_unseen
 from irb140_jax.mismatch.output.document import (
     Found,
     document,
@@ -156,11 +156,14 @@ def _diagnosed(
         ex, left = fewer, held_out(fewer, refit)
         corrected = _corrected(data, ex, refit, left, config)
     progress("looking for structure that no effect explains")
-    rest, found = unexplained(ex, left), findings(robot, ex)
+    rest = unexplained(ex, left)
     if (result := _without_unexplained_time(data, ex, left, rest, recordings, config, progress, whole)) is not None:
         return result
-    stated = data.servo
-    data, model, proof, harmful, by_laws = corrected
+    if data.servo is not None:
+        progress("fitting the model to the motion of the servos")
+    stated, fit = data.servo, fitted_in_motion(corrected.data, ex, left, refit.loose, corrected.model)
+    found = findings(robot, ex, fit.amplitudes if fit else {})
+    data, model, proof, harmful, by_laws = _in_motion(data, ex, corrected, left, fit) if fit else corrected
     bare = data
     if any(r.payload for r in data.smooth):  # the file that is written holds none
         bare = payloads_taken_off(data)
@@ -168,12 +171,13 @@ def _diagnosed(
     beyond = beyond_file(model, bare.smooth, by_laws)
     matters = reference(ex.lib, ex.scales, data.band.rate)
     seen = visibility(ex, matters)
-    of = Found(data, config.inertial_uncertainty, sensors, ex, proof, found, rest, seen, model, harmful, beyond, stated)
+    of = Found(data, config.inertial_uncertainty, sensors, ex, proof, found, rest, seen, model, harmful, beyond, stated,
+               fit)  # fmt: skip
     diagnosis = document(of, provenance(robot, data.recordings, config.options, config.words))
     diagnosis = with_joints_blocked(diagnosis, stops, robot, left_out=False)
     open_ = undecided(ex, found, seen, matters, data.band, config.inertial_uncertainty)
     progress("simulating motions that the fit did not see")
-    motion = motion_unseen(bare, ex, proof, refit.loose, model, beyond)
+    motion = motion_unseen(bare, ex, proof, refit.loose, model, beyond, fit)
     return Result(diagnosis, model, report_views(of, diagnosis.notes, motion), open_)
 
 
@@ -258,16 +262,43 @@ def _corrected(
         fitted_model(ex, refit.posterior(), refit.loose, post, scale, data.band),
         known_joints=config.known_joints or data.robot.joint_names,
     )
+    if data.servo is None:
+        return _predicted(data, ex, model, proof)
+    kd, late = ex.of_drives(own).T
+    later = data.servo.own_delay_width * late
+    model = dataclasses.replace(model, drive=data.servo.drive.found(ex.times, later, kd))
+    return _predicted(data.later(ex.times, later, kd), ex, model, proof)
+
+
+def _in_motion(data: Comparison, ex: Explanation, before: Corrected, proof: HeldOut, fit: MotionFit) -> Corrected:
+    """The same with numbers that were fitted to the motion.
+
+    Args:
+        data: Model and recordings, with drives as they were given.
+        ex: The explanation.
+        before: What was found in the torque.
+        proof: Errors on unseen data, as the fit to the torque left them.
+        fit: The fit to the motion.
+    """
+    assert data.servo is not None and before.model.drive is not None
+    stated, drive = data.servo.drive, fit.to_drive(before.model.drive)
+    kd = np.divide(drive.kd - stated.kd, stated.kd_width, out=np.zeros_like(drive.kd), where=stated.kd_width > 0.0)
+    later = drive.delay - stated.delay - ex.times.delay + fit.later
+    model = dataclasses.replace(fit.model, drive=stated.found(ex.times, later, kd))
+    data = data.later(ex.times, later, kd)
+    apart = [data.band.apply(now.tau - r.tau) for now, r in zip(data.smooth, before.data.smooth, strict=True)]
+    # What the torque's own numbers leave is not what these leave.
+    none = proof.without_discrepancy(np.ones(data.robot.n, dtype=bool))
+    return _predicted(data, ex, model, none.as_predicted([-x for x in apart]))
+
+
+def _predicted(data: Comparison, ex: Explanation, model: CorrectedModel, proof: HeldOut) -> Corrected:
+    """A model of laws with the discrepancy where that helps on unseen motions, and its errors there."""
+    post, scale, own = ex.prediction()
     by_laws = [torques_along(model, r).corrected for r in data.smooth]
     # The errors that are told are those of the model that predicts, not of its linearisation.
     proof = proof.as_predicted(ex.beyond_columns(post, scale, by_laws, data.band))
     discrepancy, harmful = discrepancy_carried(ex, own, proof.carried), np.zeros(data.robot.n, dtype=bool)
-    if data.servo is not None:
-        kd, late = ex.of_drives(own).T
-        later = data.servo.own_delay_width * late
-        model = dataclasses.replace(model, drive=data.servo.drive.found(ex.times, later, kd))
-        data = data.later(ex.times, later, kd)
-        by_laws = [torques_along(model, r).corrected for r in data.smooth]
     if data.servo is not None and discrepancy is not None:
         without = [data.band.apply(torque) for torque in by_laws]
         harmful = harmful_discrepancy(dataclasses.replace(model, discrepancy=discrepancy), data.smooth, without)

@@ -109,8 +109,12 @@ def _page(model: CorrectedModel) -> str:
         "ones. The file has no visual or collision geometry; copy it from your own model.",
         "The control of a motor is the torque that the controller commands, so a corrected torque constant is in the",
         "gear of that motor." if model.drive is None else "gear of that motor. Where gains are known, joints have "
-        "position servos, controlled by commanded positions; commands that act late are for you to delay.",
+        "position servos, controlled by commanded positions.",
     ]
+    if model.drive is not None and model.drive.delay.any():
+        each = zip(model.drive.delay, model.robot.joint_names, strict=True)
+        late = ", ".join(f"{1e3 * x:.3g} ms on {joint}" for x, joint in each)
+        lines += ["", f"Commands act later than they are given, which is for you to do: by {late}."]
     if not model.named:
         lines += ["", "The diagnosis names no effect, so only inertial parameters differ from the model as given."]
     for title, part in (("In the file", whole), ("In the file in part", partly), ("Not in the file", without)):

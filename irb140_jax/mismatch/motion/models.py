@@ -58,13 +58,12 @@ class Simulated:
             return tau
         return (tau if name == FILE else tau - missing) * self.gear
 
-
     def driven(self, name: str, drive: Drive | None) -> mujoco.MjModel:
         """A model as a recording drives it: with position servos in the place of its motors where there are any.
 
         Args:
             name: Of the model.
-            drive: Of the servos; an unknown gain counts as zero.
+            drive: Of the servos; an unknown gain counts as zero, and so does a lag.
         """
         if drive is None:
             return self.compiled[name]
@@ -88,13 +87,26 @@ def simulated(model: CorrectedModel, nominal: mujoco.MjModel, step: float) -> Si
         nominal: The model as given, compiled.
         step: Time step [s].
     """
-    file, bare = native_robot(model), without_those(model)
-    robots = {"refit": _refitted(model), FILE: file} | ({} if bare is model else {"corrected": native_robot(bare)})
-    compiled = {name: compiled_robot(robot, step) for name, robot in robots.items()}
+    corrected = simulated_corrected(model, step)
+    file = corrected.compiled["corrected"] if without_those(model) is model else (
+        compiled_robot(native_robot(model), step))
+    compiled = {"nominal": nominal, "refit": compiled_robot(_refitted(model), step), FILE: file} | corrected.compiled
     if any(m.nv != model.robot.n for m in compiled.values()):
         return None
-    compiled = {"nominal": nominal, "corrected": compiled[FILE]} | compiled
-    return Simulated(model, compiled, np.asarray(file.gear) / np.asarray(model.robot.gear))
+    return dataclasses.replace(corrected, compiled=compiled)
+
+
+def simulated_corrected(model: CorrectedModel, step: float) -> Simulated:
+    """The corrected model alone, compiled; `step` is that of the simulation [s]."""
+    native = native_robot(without_those(model))
+    gear = np.asarray(native.gear) / np.asarray(model.robot.gear)
+    return Simulated(model, {"corrected": compiled_robot(native, step)}, gear)
+
+
+def followers(models: Sequence[Simulated], recordings: Sequence[Conditioned]) -> np.ndarray:
+    """Joints that have to follow the recording, (n,): nothing moves them as it should in one of the models."""
+    unknown = [np.isnan(r.servo.drive.kp) for r in recordings if r.servo is not None]
+    return np.any([*(m.weightless(r) for m in models for r in recordings), *unknown], axis=0)
 
 
 def positions_of(

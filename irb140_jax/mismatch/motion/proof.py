@@ -7,19 +7,20 @@ from typing import Any
 import numpy as np
 
 from irb140_jax.mismatch.corrected.model import CorrectedModel
+from irb140_jax.mismatch.motion.inputs import Inputs, time_steps
 from irb140_jax.mismatch.motion.laws import beyond_numbers
 from irb140_jax.mismatch.motion.models import (
     FILE,
     Simulated,
-    asked,
     compiled_robot,
+    followers,
     leading,
     led,
     positions_of,
     simulated,
 )
 from irb140_jax.mismatch.motion.sentences import MODELS, sentences, subject
-from irb140_jax.mismatch.motion.windows import FINEST, FINEST_SERVO, LONGEST, Span, Window, windows
+from irb140_jax.mismatch.motion.windows import LONGEST, Span, Window, windows
 from irb140_jax.oracle.rollout import tool_positions
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.robot import Robot
@@ -50,17 +51,14 @@ def proof_in_motion(
         w.recording].t[w.first] > 2.0 * TIMES[-1]]  # fmt: skip
     if not short:
         return None
-    step = float(np.mean([r.t[1] - r.t[0] for r in recordings]))
-    drives = [r.servo.drive for r in recordings if r.servo is not None]
-    parts = max(1, int(np.ceil(step / (FINEST_SERVO if drives else FINEST))))
+    (step, parts), of_servos = time_steps(recordings), recordings[0].servo is not None
     nominal, ready = compiled_robot(robot, step / parts), {}
     for fold in dict.fromkeys(w.fold for w in (*short, *runs)):
         made = simulated(of_fold(fold), nominal, step / parts)
         if made is None or nominal.nv != robot.n:
             return None
         ready[fold] = made
-    weightless = [m.weightless(r) for m in ready.values() for r in recordings]
-    follow = np.any([*weightless, *(np.isnan(d.kp) for d in drives)], axis=0)
+    follow = followers([*ready.values()], recordings)
     if follow.all():
         return None
     if follow.any():
@@ -69,16 +67,17 @@ def proof_in_motion(
     beside = titles(n for m in ready.values() for n in beyond_numbers(m.model))
     lacking = [x for x in titles(n for m in ready.values() for n in m.model.named) if x not in beside]
     names = (*MODELS, FILE) if lacking or beside else MODELS
-    logged = [0.0 * r.tau if drives else r.tau for r in recordings]
+    logged = [0.0 * r.tau if of_servos else r.tau for r in recordings]
     applied = lambda name, w: leading(  # noqa: E731
         ready[w.fold].torque(name, logged[w.recording], missing[w.recording]), recordings[w.recording], follow
     )
-    at = _errors(ready, names, applied, recordings, short, parts, np.array(TIMES))
-    over = _errors(ready, names, applied, recordings, runs, parts, np.linspace(0.0, LONGEST, 41)[1:]) if runs else {}
+    at = _errors(ready, names, applied, Inputs(recordings, short, parts, step), np.array(TIMES))
+    times = np.linspace(0.0, LONGEST, 41)[1:]
+    over = _errors(ready, names, applied, Inputs(recordings, runs, parts, step), times) if runs else {}
     free, units = np.flatnonzero(~follow).tolist(), ["m" if slide else "rad" for slide in robot.is_slide]
     out = {
         "schema": SCHEMA,
-        "driven_by": "commands" if drives else "torque",
+        "driven_by": "commands" if of_servos else "torque",
         "horizon": list(TIMES),
         "windows": len(short),
         "runs": len(runs),
@@ -96,46 +95,28 @@ def proof_in_motion(
 
 def _errors(
     models: dict[int, Simulated], names: Sequence[str], applied: Callable[[str, Window], np.ndarray],
-    recordings: Sequence[Conditioned], cut: Sequence[Window], parts: int, times: np.ndarray,
+    given: Inputs, times: np.ndarray,
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """By model, and as "moved" for a robot that stays where it is: errors of all joints and, last, at the tool,
     shape (windows, times, n + 1) [rad, m]; NaN beyond the end of a window."""
+    cut, recordings = given.cut, given.recordings
     tool_of = models[cut[0].fold].compiled["nominal"]
-    longest = max(w.last - w.first for w in cut)
     n = recordings[0].q.shape[1]
-    tau, control = np.zeros((2, len(cut), longest * parts, n))
-    start, speed = np.zeros((2, len(cut), n))
-    fine = [w.first + np.arange((w.last - w.first) * parts) / parts for w in cut]
-    for b, w in enumerate(cut):
-        r = recordings[w.recording]
-        if r.servo is not None:
-            control[b, : len(fine[b])] = _between(asked(r.servo), fine[b])
-        start[b] = r.q[w.first]
-        speed[b] = r.qd[w.first] - 0.5 * (r.t[1] - r.t[0]) / parts * r.qdd[w.first]
-    of_windows = [models[w.fold] for w in cut]
-    servos = [(r := recordings[w.recording]).servo and r.servo.drive for w in cut]
-    began = np.array([(r := recordings[w.recording]).t[w.first] - r.began for w in cut])
+    of_windows, servos, control = [models[w.fold] for w in cut], given.drives, given.control()
     true, still, simulated_ = (np.full((len(cut), len(times), n), np.nan) for _ in range(3))
     out = {}
     for name in names:
-        for b, w in enumerate(cut):
-            tau[b, : len(fine[b])] = _between(applied(name, w), fine[b])
-        own = positions_of(of_windows, name, servos, start, speed, tau, control, began)[:, ::parts]
+        tau = given.between(lambda w, name=name: applied(name, w))
+        own = positions_of(of_windows, name, servos, given.start, given.speed, tau, control, given.began)
         for k, w in enumerate(cut):
             r = recordings[w.recording]
             rows = np.round(times / (r.t[1] - r.t[0])).astype(int)
             there = rows <= w.last - w.first
             true[k, there], still[k] = r.q[w.first + rows[there]], r.q[w.first]
-            simulated_[k, there] = own[k, rows[there]]
+            simulated_[k, there] = own[k, given.parts * rows[there]]
         out[name] = _apart(tool_of, simulated_, true)
     out["moved"] = _apart(tool_of, np.where(np.isnan(true), np.nan, still), true)
     return out
-
-
-def _between(x: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Rows between the rows of x, straight from one to the next."""
-    low = np.minimum(at.astype(int), len(x) - 2)
-    return x[low] + (at - low)[:, None] * (x[low + 1] - x[low])
 
 
 def _apart(model, one: np.ndarray, other: np.ndarray) -> np.ndarray:

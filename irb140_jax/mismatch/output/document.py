@@ -10,6 +10,7 @@ from irb140_jax.effects import Effect
 from irb140_jax.effects.torque_gain import EFFECT as TORQUE_GAIN
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.corrected.native import native_gap
+from irb140_jax.mismatch.motion import MotionFit
 from irb140_jax.mismatch.output import views
 from irb140_jax.mismatch.output.findings import torque_scale_finding
 from irb140_jax.mismatch.output.inertials import link_shifts
@@ -24,7 +25,14 @@ from irb140_jax.mismatch.output.notes import (
     timing_notes,
     unproved_notes,
 )
-from irb140_jax.mismatch.output.servos import command_notes, gain_notes, harmful_notes, of_servos, servo_sentence
+from irb140_jax.mismatch.output.servos import (
+    command_notes,
+    gain_notes,
+    harmful_notes,
+    motion_notes,
+    of_servos,
+    servo_sentence,
+)
 from irb140_jax.mismatch.output.summary import open_sentence, summary, verdict
 from irb140_jax.mismatch.records import rounded
 from irb140_jax.mismatch.regression.sensor_noise import coarse_positions
@@ -64,6 +72,7 @@ class Found:
         beyond: What corrected.xml lacks of the model's torque along each recording, (T, n) [N m or N]; None where
             unknown.
         servo: Commands and drive as they were given, where the recordings held these in place of torque.
+        fit: Of servos to the motion, whose numbers the model has.
     """
 
     data: Comparison
@@ -78,6 +87,7 @@ class Found:
     harmful: np.ndarray
     beyond: Sequence[np.ndarray] | None
     servo: Commanded | None = None
+    fit: MotionFit | None = None
 
 
 def document(of: Found, origin: Provenance) -> Diagnosis:
@@ -219,7 +229,7 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     gap = None if of.beyond is None else native_gap(of.beyond, of.data.band)
     lacking = list(dict.fromkeys(n.effect.title for n in of.model.named if n.effect.export.not_in_mjcf))
     channels = timing_notes(of.ex) if of.servo is None else [
-        *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo)]
+        *motion_notes(robot, of.fit), *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo)]
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
     return [
         *of.data.servo_notes, *link_encoder_notes(of.data, of.model, of.findings),

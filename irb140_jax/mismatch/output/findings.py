@@ -1,21 +1,32 @@
 """From an explanation to findings: parameters with intervals, evidence, and alternatives."""
 
+import dataclasses
+from collections.abc import Mapping
+
 import numpy as np
 from scipy import special
 
 from irb140_jax.effects import Effect
 from irb140_jax.effects.base import separating_motion
 from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.output.certain import certain
 from irb140_jax.mismatch.result import Alternative, Estimate, Evidence, Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.mismatch.validation.held_out import held_out_gains
-from irb140_jax.mismatch.validation.intervals import parameters_of
+from irb140_jax.mismatch.validation.intervals import parameters_of, physical_of
 from irb140_jax.robot import Robot
 
 
-def findings(robot: Robot, ex: Explanation) -> list[Finding]:
-    """The findings, strongest first."""
+def findings(robot: Robot, ex: Explanation, in_motion: Mapping[int, np.ndarray]) -> list[Finding]:
+    """The findings, strongest first.
+
+    Args:
+        robot: The nominal model.
+        ex: The explanation.
+        in_motion: Amplitudes that were fitted to the motion, by candidate.  By how much they differ from those of the
+            torque is added to the standard deviations: two views of one law.
+    """
     post = ex.posterior()
     w = post.mean * ex.data.scale[post.columns]
     cov = post.cov * np.outer(ex.data.scale[post.columns], ex.data.scale[post.columns])
@@ -24,16 +35,30 @@ def findings(robot: Robot, ex: Explanation) -> list[Finding]:
         c = ex.data.candidates[index]
         if c.is_inertials:
             continue
-        values = parameters_of(robot, ex, index, w[rows], cov[rows, rows])
+        own, spread = w[rows], cov[rows, rows]
+        values = parameters_of(robot, ex, index, own, spread)
+        if index in in_motion:
+            own = in_motion[index]
+            values = _in_motion(c, values, own)
+            spread = spread + np.outer(own - w[rows], own - w[rows])
         joints = tuple(robot.joint_names[j] for j in c.joints)
         numbers, units = {k: v.value or 0.0 for k, v in values.items()}, {k: v.unit for k, v in values.items()}
         odds, gain = ex.log_odds(index), gains[index]
         out.append((odds, Finding(
             c.slug, joints, c.effect.sentence(", ".join(joints), numbers, units), values,
             Evidence(odds, ex.probability(index), gain),
-            certain(robot, ex, index, w[rows], cov[rows, rows], gain), _alternatives(ex, index),
+            certain(robot, ex, index, own, spread, gain), _alternatives(ex, index),
         )))  # fmt: skip
     return [finding for _, finding in sorted(out, key=lambda one: -one[0])]
+
+
+def _in_motion(c: Candidate, of_torque: Mapping[str, Estimate], w: np.ndarray) -> dict[str, Estimate]:
+    """Parameters by amplitudes that were fitted to the motion, shape (k,), beside those of the torque."""
+    now = dict(zip((p.name for p in c.effect.law.parameters), physical_of(c, w).tolist(), strict=True))
+    return {
+        name: dataclasses.replace(p, value=now[name], std=float(np.hypot(p.std or 0.0, now[name] - (p.value or 0.0))))
+        for name, p in of_torque.items()
+    }
 
 
 def torque_scale_odds(ex: Explanation) -> tuple[float, float]:

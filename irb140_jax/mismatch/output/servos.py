@@ -1,26 +1,23 @@
 """What a diagnosis of servo logs says beside its findings: which errors of the drive look like a finding."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from irb140_jax.effects import At
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
+from irb140_jax.mismatch.motion import MotionFit
 from irb140_jax.mismatch.records import digits
 from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
-from irb140_jax.mismatch.regression.nuisances import FIXED
-from irb140_jax.mismatch.regression.servo import NAMES
+from irb140_jax.mismatch.regression.nuisances import COMMAND_DELAY, DRIVE_KD, FIXED
 from irb140_jax.mismatch.result import Estimate, Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.recordings.condition import Commanded, Conditioned
 from irb140_jax.recordings.drive import PAYLOAD, unknown_drive
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
-
-COMMAND_DELAY = len(FIXED) + NAMES.index("command")
-DRIVE_KD = len(FIXED) + NAMES.index("kd")
 
 
 def without_negligible(ex: Explanation, servo: Commanded | None) -> Explanation:
@@ -87,7 +84,7 @@ def of_servos(ex: Explanation, servo: Commanded | None, found: list[Finding]) ->
         said = ""
         if f.effect == "viscous_friction":
             j = names.index(f.joints[0])
-            off = float(servo.drive.kd_width[j]) * _own_nuisance(ex, j, DRIVE_KD)[0]
+            off = float(servo.drive.kd_width[j]) * ex.own_nuisance(j, DRIVE_KD)[0]
             both = (f.parameters["viscous"].value or 0.0) + float(servo.drive.kd[j]) + off
             said = (
                 f" It can't be told from the drive's Kd, which is taken as {servo.drive.kd[j]:.3g}: only the sum of "
@@ -161,6 +158,33 @@ def by_known_payload(
     return out
 
 
+def motion_notes(robot: Robot, fit: MotionFit | None) -> list[str]:
+    """What a fit to the motion changed."""
+    if fit is None:
+        return []
+    said = [
+        "The numbers of what is named, and of the servos, are those with which a simulation from the commands follows "
+        "the positions best, beside what the torque says of them: on motions that the fit did not see it is nearer to "
+        f"the positions by {100 * fit.gain:.0f} %. Standard deviations hold by how much torque and motion disagree."
+    ]
+    if stronger := _each(robot, fit.strength, lambda x: f"{1.0 + x:.3g}"):
+        said.append(
+            f"By the motion the servos give, in parts of the torque that is stated, {stronger}; corrected.xml has it "
+            "in their gains."
+        )
+    if rotors := _each(robot, fit.rotors, digits):
+        said.append(
+            f"A rotor inertia in kg m^2 (kg where the joint slides) of {rotors} makes the simulation follow the motion "
+            "better, while the torque leaves open whether it is there: it is in the corrected model and not named."
+        )
+    return said
+
+
+def _each(robot: Robot, numbers: Mapping[int, tuple[float, float]], words: Callable[[float], str]) -> str:
+    """Numbers with their standard deviations, by joint."""
+    return ", ".join(f"{words(x)} +- {digits(std, 1)} on {robot.joint_names[j]}" for j, (x, std) in numbers.items())
+
+
 def gain_notes(ex: Explanation, servo: Commanded) -> list[str]:
     """What the masses of the model, or a known payload, say of the gains."""
     shown = [j for j, said in enumerate(servo.drive.said) if said == PAYLOAD]
@@ -205,7 +229,7 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
             f"{digits(1e3 * max(phases))} ms after it. The fit takes this into account."
         )
     for j in range(ex.lib.robot.n):
-        own, spread = _own_nuisance(ex, j, COMMAND_DELAY)
+        own, spread = ex.own_nuisance(j, COMMAND_DELAY)
         odds = log_odds_of_any(own, spread, 1.0) + np.log(settings.RARE)
         if odds > 0.0 and abs(servo.own_delay_width * own) > settings.NOTABLE_DELAY:
             late, width = 1e3 * servo.own_delay_width * own, 1e3 * servo.own_delay_width * spread
@@ -216,14 +240,6 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
                 "torque lags, or the clocks are out of step."
             )
     return out
-
-
-def _own_nuisance(ex: Explanation, j: int, which: int) -> tuple[float, float]:
-    """One of a joint's own nuisance parameters and its standard deviation, both in prior standard deviations."""
-    shared = np.zeros((1, len(ex.space.set_columns(ex.chosen))))
-    own = (np.arange(len(ex.space.joints[j].groups)) == which)[None].astype(float)
-    mean, cov = ex.space.functions(ex.chosen, ex.hyper, j, shared, own)
-    return float(mean[0]), float(np.sqrt(cov[0, 0]))
 
 
 def servo_sentence(recordings: Sequence[Recording]) -> str:

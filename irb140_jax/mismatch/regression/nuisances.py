@@ -9,7 +9,7 @@ from irb140_jax.effects import Scales
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Prepared
 from irb140_jax.mismatch.regression.discrepancy import features
-from irb140_jax.mismatch.regression.servo import common_columns, damping_of_scale, scale_width, servo_columns
+from irb140_jax.mismatch.regression.servo import NAMES, common_columns, damping_of_scale, scale_width, servo_columns
 from irb140_jax.mismatch.regression.tangent import Point, delayed, late
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.payload import distinct, inertials_per_metre
@@ -17,6 +17,7 @@ from irb140_jax.robot import Robot
 
 # A joint's own columns with stated widths, in their order; those of a servo come after them.
 FIXED = ("gain", "delay", "rotor", "smoothing", "bias")
+DRIVE_KD, COMMAND_DELAY = (len(FIXED) + NAMES.index(name) for name in ("kd", "command"))  # of servos, after those
 COMMON = 3  # nuisance parameters that all joints share, beside those of servos
 # Groups of columns with stated widths: errors of the instrument, and those of a servo's drive, which models hold.
 INSTRUMENT, DRIVE = -1, -2

@@ -5,8 +5,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
+from scipy import special
 
 from irb140_jax.effects import Effect, Scales
+from irb140_jax.effects.rotor_inertia import EFFECT as ROTOR
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Loads, Prepared, all_prepared, scales_of, seen_by
 from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, of_kinds, reshaped
@@ -28,9 +30,10 @@ from irb140_jax.mismatch.regression.silent import silent_rows
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
 from irb140_jax.mismatch.selection.averages import Site, site_of
-from irb140_jax.mismatch.selection.evidence import Space
+from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
+from irb140_jax.mismatch.selection.screening import gains
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.recordings.condition import Conditioned
@@ -196,14 +199,24 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         found, found_hyper, falls = falling(*named(space, best, hyper, sets))
     for joint in joints:
         joint.forget()
-    members = [data.candidates[i] for i in found]
+    left_open = _rotors_open(space, data, found, found_hyper) if last and given.drive is not None else ()
+    members = [data.candidates[i] for i in (*found, *left_open)]
     held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
     data = dataclasses.replace(data, stretches=held)
     ex = Explanation(
         lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
         unproved=start.unproved, times=start.times, payloads=tuple(r.recording.payload for r in start.along),
+        open=left_open,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
+
+
+def _rotors_open(space: Space, data: Data, found: tuple[int, ...], hyper: Hyper) -> tuple[int, ...]:
+    """Rotors that are not named, of which the torque leaves open whether they are there, among the candidates."""
+    named = {data.candidates[i].joints for i in found if data.candidates[i].effect is ROTOR}
+    rotors = [i for i, c in enumerate(data.candidates) if c.effect is ROTOR and c.joints not in named]
+    probable = special.expit(gains(space, found, hyper, np.array(rotors, dtype=int))) > settings.LISTED_PROBABILITY
+    return tuple(i for i, possible in zip(rotors, probable, strict=True) if possible)
 
 
 def _sites(data: Data, chosen: Sequence[int]) -> set[Site]:
@@ -268,8 +281,9 @@ def _first_noise(
 
 
 def _by_block(ex: Explanation, sensors: np.ndarray) -> Explanation:
-    """The explanation with Gram matrices of what it names by block of the data, to leave some out."""
-    joints = grams_by_block(ex.data, ex.extra, ex.noise, sensors, ex.columns(), settings.BLOCKS)
+    """The explanation with Gram matrices of what it names or leaves open by block of the data, to leave some out."""
+    columns = ex.columns((*ex.chosen, *ex.open))
+    joints = grams_by_block(ex.data, ex.extra, ex.noise, sensors, columns, settings.BLOCKS)
     return dataclasses.replace(ex, by_block=dataclasses.replace(ex.space, joints=joints))
 
 

@@ -48,6 +48,7 @@ class Explanation:
         payloads: What the tool carried in each recording, by which its rows were made.
         rigid: The fit of the inertials alone, from all blocks of the data or all but some: it predicts where nothing is
             named.  None in logs of commands, where drives err beside it.
+        open: Rotors that are not named and that the torque of servos leaves open: a fit to the motion may need them.
     """
 
     lib: Library
@@ -67,6 +68,7 @@ class Explanation:
     times: Times = Times()
     payloads: tuple[Payload | None, ...] = ()
     rigid: Callable[[np.ndarray | None], Posterior] | None = None
+    open: tuple[int, ...] = ()
 
     @property
     def members(self) -> list[Candidate]:
@@ -170,6 +172,13 @@ class Explanation:
     def torque_lag(self) -> float:
         """Lag of all torques behind what commands and positions say [s]; none comes before."""
         return max(self.times.lag + self._common(self.space.inertials + 1, LAG_WIDTH)[0], 0.0)
+
+    def own_nuisance(self, j: int, which: int) -> tuple[float, float]:
+        """One of a joint's own nuisance parameters and its standard deviation, both in prior standard deviations."""
+        shared = np.zeros((1, len(self.space.set_columns(self.chosen))))
+        own = (np.arange(len(self.space.joints[j].groups)) == which)[None].astype(float)
+        mean, cov = self.space.functions(self.chosen, self.hyper, j, shared, own)
+        return float(mean[0]), float(np.sqrt(cov[0, 0]))
 
     def phases(self, stated: Drive) -> tuple[np.ndarray, np.ndarray]:
         """By how much later commands of each recording are taken up than those of all, and standard deviations [s].

@@ -34,7 +34,7 @@ def parameters_of(
         By the parameter's name, in SI units.
     """
     c = ex.data.candidates[index]
-    value = _physical(c, w)
+    value = physical_of(c, w)
     over_shapes = np.maximum(_variance_over_shapes(ex, index, value), _variance_about_shape(ex, index, w))
     if c.effect.law.empirical:
         cov = cov + _of_form(ex, c, w)
@@ -105,7 +105,7 @@ def _of_all_columns(ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray)
     return full, spread
 
 
-def _physical(c: Candidate, w: np.ndarray) -> np.ndarray:
+def physical_of(c: Candidate, w: np.ndarray) -> np.ndarray:
     """Physical parameters from the amplitudes that a candidate uses."""
     full = np.zeros(c.effect.law.width)
     full[list(c.variant)] = w
@@ -175,9 +175,9 @@ def _variance_about_shape(ex: Explanation, index: int, w: np.ndarray) -> np.ndar
     along = np.vstack([along, np.hstack([-np.tile(w, (len(near), 1)), to]) * per_scale])
     prior = np.concatenate([np.ones(k), np.full(len(near), FAR**-2)])
     cov = np.linalg.inv(along @ H @ along.T + np.diag(prior))
-    value = _physical(c, w)
-    slope = [(_physical(c, w + SMALL * step) - value) / SMALL for step in np.diag(scale[:k])]
-    slope += [_physical(o, w) - value for o in near]
+    value = physical_of(c, w)
+    slope = [(physical_of(c, w + SMALL * step) - value) / SMALL for step in np.diag(scale[:k])]
+    slope += [physical_of(o, w) - value for o in near]
     return np.einsum("ip,ij,jp->p", slope, cov, slope)
 
 
@@ -203,7 +203,7 @@ def _refitted(ex: Explanation, index: int, other: int) -> np.ndarray:
     post = ex.posterior((*ex.others(index), other))
     c = ex.data.candidates[other]
     k = len(c.columns)
-    return _physical(c, (post.mean * ex.data.scale[post.columns])[-k:])
+    return physical_of(c, (post.mean * ex.data.scale[post.columns])[-k:])
 
 
 def _inertial_doubt(ex: Explanation, c: Candidate) -> float:

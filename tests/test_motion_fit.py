@@ -1,0 +1,77 @@
+"""Numbers of servos that follow the recorded motion."""
+
+import dataclasses
+import pathlib
+import sys
+
+import numpy as np
+import pytest
+from helpers import ROOT, recordings_folder
+from helpers_servo import KD, KP, RATE, closed_loop, two_links
+from scipy import stats
+
+import irb140_jax as irb
+from irb140_jax.effects.catalogue import CATALOGUE
+from irb140_jax.mismatch import DiagnoseConfig, diagnose
+from irb140_jax.mismatch.motion.fit import TAILS, _gain, _student
+from irb140_jax.recordings import stated_drive
+
+sys.path.insert(0, str(ROOT / "experiments"))
+import real_servos
+
+LIBRARY = ("coulomb_friction", "viscous_friction", "rotor_inertia", "torque_offset")
+GOAL = 0.0325  # rad, mean absolute error of position on runs that are kept back: see real_bam_xl330.py
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory):
+    path = tmp_path_factory.mktemp("model") / "arm.xml"
+    path.write_text(two_links(actuators=""))
+    return irb.load_robot(path)
+
+
+# --- its parts -------------------------------------------------------------------------------------------------------
+
+
+def test_the_usual_size_of_an_error_is_that_of_students_distribution():
+    square = stats.f(1, TAILS).rvs((4000, 2), random_state=1) * [4.0, 0.01]  # squares of Student's t
+    weight, size = _student(square)
+    np.testing.assert_allclose(size, [4.0, 0.01], rtol=0.1)
+    assert weight[np.argmax(square[:, 0]), 0] < 0.1 < 1.0 < weight[np.argmin(square[:, 0]), 0]
+
+
+def test_the_gain_is_the_share_of_the_error_that_is_gone():
+    errors = np.random.default_rng(0).normal(size=(20, 50, 3))
+    errors[:, :5], errors[..., 2] = np.nan, np.nan
+    assert abs(_gain(0.5 * errors, errors) - 0.5) < 1e-9
+    assert abs(_gain(errors, errors)) < 1e-9
+
+
+# --- whole diagnoses -------------------------------------------------------------------------------------------------
+
+
+def test_gains_that_are_stated_wrong_and_friction_follow_the_motion(robot):
+    """Both servos are a fifth weaker than is stated, and both joints rub."""
+    kp, kd = (tuple(0.8 * x for x in gains) for gains in (KP, KD))
+    plant = two_links(kp, kd, shoulder='frictionloss="0.5"', elbow='frictionloss="0.25"')
+    runs = [dataclasses.replace(closed_loop(plant, seed)[0], drive=stated_drive(np.array(KP), np.array(KD)))
+            for seed in (1, 2, 3)]  # fmt: skip
+    result = diagnose(robot, runs[:2], DiagnoseConfig(effects=tuple(CATALOGUE[slug] for slug in LIBRARY)))
+    found = {f.joints[0]: f.parameters["coulomb"] for f in result.diagnosis.findings if "coulomb" in f.parameters}
+    assert set(found) == {"shoulder", "elbow"}
+    for joint, true in (("shoulder", 0.5), ("elbow", 0.25)):
+        value, std = found[joint].value, found[joint].std
+        assert value and std and abs(value - true) < 2.0 * std
+    assert any("follows the positions best" in note for note in result.diagnosis.notes)
+    # A second after a start whose speed it is not told, it is where the robot is.
+    apart = real_servos.off(result, runs[2:])["corrected"][0][int(RATE) :]
+    assert (np.sqrt(np.mean(apart**2, axis=0)) < 5e-4 * np.ptp(runs[2].q, axis=0)).all()
+
+
+def test_a_real_servo_goes_where_its_numbers_in_motion_say(tmp_path: pathlib.Path):
+    """A hobby servo from goals and positions alone: the runs with another gain are kept back."""
+    recordings_folder()
+    said = real_servos.bam(tmp_path)
+    (finding,) = said["findings"]
+    assert finding["effect"] == "load_dependent_friction"
+    assert said["position_error"]["corrected"] <= GOAL < 0.5 * said["position_error"]["refit"]
