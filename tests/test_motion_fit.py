@@ -13,7 +13,7 @@ from scipy import stats
 import irb140_jax as irb
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import DiagnoseConfig, diagnose
-from irb140_jax.mismatch.motion.fit import TAILS, _gain, _student
+from irb140_jax.mismatch.motion.fit import TAILS, _gain, _student, _weights
 from irb140_jax.recordings import stated_drive
 
 sys.path.insert(0, str(ROOT / "experiments"))
@@ -38,6 +38,15 @@ def test_the_usual_size_of_an_error_is_that_of_students_distribution():
     weight, size = _student(square)
     np.testing.assert_allclose(size, [4.0, 0.01], rtol=0.1)
     assert weight[np.argmax(square[:, 0]), 0] < 0.1 < 1.0 < weight[np.argmin(square[:, 0]), 0]
+
+
+def test_joints_that_follow_the_recording_and_short_windows_count_for_nothing():
+    errors = np.random.default_rng(2).normal(size=(6, 40, 3))
+    errors[..., 1], errors[0] = np.nan, np.nan
+    weight = _weights(errors)
+    assert weight.shape == (6, 1, 3) and np.isnan(weight[0]).all() and np.isnan(weight[..., 1]).all()
+    assert (weight[1:, :, [0, 2]] > 0.0).all()
+    assert np.isfinite(_weights(0.0 * errors)[1:, :, [0, 2]]).all()
 
 
 def test_the_gain_is_the_share_of_the_error_that_is_gone():

@@ -4,12 +4,11 @@ Torque of commands follows from positions that the friction itself has shaped, s
 its numbers away from those that make a simulation move as the robot did.  Here the closed loop is simulated from many
 moments of the recordings, and these are changed until it follows the positions:
 
-    the amplitudes of what is named, where it acts on a joint and in the simulation; a rotor on each joint where none is
-    named; how strong each servo is beside its stated gains; its Kd; the time at which commands act
+    the amplitudes of what is named, where it acts on a joint and in the simulation; rotors that the torque leaves open;
+    how strong each servo is beside its stated gains; its Kd; the time at which commands act
 
-What the torque says of amplitudes and rotors is their prior, the rest has its stated widths.  Least squares by Gauss's
-and Newton's method, with finite differences of MuJoCo's simulation.  The numbers are kept where simulations of motions
-that the fit did not see err less with them.
+What the torque says is their prior.  Least squares by Gauss's and Newton's method, with finite differences of MuJoCo's
+simulation.  The numbers are kept where simulations of motions that the fit did not see err less with them.
 """
 
 import dataclasses
@@ -34,11 +33,13 @@ from irb140_jax.recordings.drive import Drive
 ROUNDS = 3  # of Gauss's and Newton's method
 SETTLED = 1.0  # of the log posterior: a round that gains less is the last
 STEP = 0.5  # prior standard deviations over which slopes are taken: sticking makes a simulation jagged below
-FORGOTTEN = 0.25  # [s] from a start, in which its own error counts: servos are at their goals by then
+FORGOTTEN = 0.25  # [s] from a start, in which its own error counts most: servos are at their goals by then
 TAILS = 4.0  # degrees of freedom of Student's distribution over windows: Lange, Little and Taylor, JASA 84 (1989)
 ITERATIONS = 20  # to the size of Student's distribution
 FLOWN = 10.0  # [rad or m] off, a simulation has flown away
 MOST = 8  # changed models that are simulated side by side: memory
+TINY = 1e-300
+
 
 @dataclasses.dataclass(frozen=True)
 class MotionFit:
@@ -257,7 +258,8 @@ def _weights(errors: np.ndarray) -> np.ndarray:
     """
     square = _mean_square(errors)
     usual, size = _student(square)
-    alike = [correlation_time([x[~np.isnan(x)] for x in errors[..., j]]) for j in range(errors.shape[-1])]
+    known = [[x[~np.isnan(x)] for x in errors[..., j] if not np.isnan(x).all()] for j in range(errors.shape[-1])]
+    alike = [correlation_time(of_joint) if of_joint else 1.0 for of_joint in known]
     return (usual / size / alike)[:, None, :]
 
 
@@ -290,7 +292,7 @@ def _information(
     count = len(of_motion)
     varies = np.cov(of_motion.T).reshape(gram.shape) * count if count > 1 else gram
     known = linalg.inv(gram + free.precision)
-    return float(min(1.0, np.sum(known * gram) / max(np.sum(known * varies), 1e-300)))
+    return float(min(1.0, np.sum(known * gram) / max(np.sum(known * varies), TINY)))
 
 
 def _cost(free: Free, x: np.ndarray, weight: np.ndarray, errors: np.ndarray) -> float:
@@ -323,9 +325,9 @@ def _student(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     counts = np.isfinite(square).any(axis=0)
     weight, size, own = np.full(square.shape, np.nan), np.full(square.shape[1], np.nan), square[:, counts]
-    usual = np.nanmedian(own, axis=0)
+    usual = np.maximum(np.nanmedian(own, axis=0), TINY)
     for _ in range(ITERATIONS):
         heavy = (TAILS + 1.0) / (TAILS + own / usual)
-        usual = np.nanmean(heavy * own, axis=0)
+        usual = np.maximum(np.nanmean(heavy * own, axis=0), TINY)
     weight[:, counts], size[counts] = heavy, usual
     return weight, size

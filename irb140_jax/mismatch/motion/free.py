@@ -17,6 +17,7 @@ from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.recordings.drive import Drive
 
+ALIKE = 1e-9  # of a variance: by how much amplitudes that the torque can't tell apart differ
 STRENGTHS = (-0.9, 9.0)  # of a servo, less one: as it were none, and of another gear
 
 # A corrected model, what makes its drive of a recording's, and by how much later that acts [s].
@@ -80,7 +81,7 @@ class Free:
                 bounds = enumerate(zip(c.lowest.tolist(), c.highest.tolist(), strict=True))
                 laws += [(What("rotor" if i in rotors else "law", at, k), part.start + k, *ends) for k, ends in bounds]
             at += 1
-        drive, rows = data.servo.drive, [row for _, row, _, _ in laws]
+        drive = data.servo.drive
         for j in range(model.robot.n):
             kd = float(np.nan_to_num(drive.kd_width[j])) * ex.own_nuisance(j, DRIVE_KD)[1]
             widths += [(What("strength", j), float(np.nan_to_num(drive.kp_width[j])), *STRENGTHS)]
@@ -88,11 +89,13 @@ class Free:
         if drive.common_delay_width:
             widths += [(What("later", -1), ex.command_delay(drive)[1], -float(np.min(drive.delay)), np.inf)]
         widths = [x for x in widths if x[1] > 0.0]
-        scale = ex.data.scale[post.columns][rows]
-        cov = post.cov[np.ix_(rows, rows)] * np.outer(scale, scale)
+        scale = ex.data.scale[post.columns]
+        laws = [x for x in laws if scale[x[1]] > 0.0]  # others move nothing
+        rows = [row for _, row, _, _ in laws]
+        cov = post.cov[np.ix_(rows, rows)] * np.outer(scale[rows], scale[rows])
         std = np.sqrt(np.diag(cov))
         precision = np.eye(len(rows) + len(widths))
-        precision[: len(rows), : len(rows)] = linalg.pinvh(cov / np.outer(std, std))
+        precision[: len(rows), : len(rows)] = linalg.inv(cov / np.outer(std, std) + ALIKE * np.eye(len(rows)))
         unit = np.concatenate([std, [x[1] for x in widths]])
         low, high = (np.array([x[k] for x in (*laws, *widths)]) / unit for k in (2, 3))
         of_what = (*(x[0] for x in laws), *(x[0] for x in widths))
