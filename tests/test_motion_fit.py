@@ -1,8 +1,9 @@
-"""Numbers of servos that follow the recorded motion."""
+"""Parameters of servos that follow the recorded motion."""
 
 import dataclasses
 import pathlib
 import sys
+import types
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from scipy import stats
 import irb140_jax as irb
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import DiagnoseConfig, diagnose
-from irb140_jax.mismatch.motion.fit import TAILS, _gain, _student, _weights
+from irb140_jax.mismatch.motion.fit import FREEDOM, _improvement, _information, _student, _weights
 from irb140_jax.recordings import stated_drive
 
 sys.path.insert(0, str(ROOT / "experiments"))
@@ -34,7 +35,7 @@ def robot(tmp_path_factory):
 
 
 def test_the_usual_size_of_an_error_is_that_of_students_distribution():
-    square = stats.f(1, TAILS).rvs((4000, 2), random_state=1) * [4.0, 0.01]  # squares of Student's t
+    square = stats.f(1, FREEDOM).rvs((4000, 2), random_state=1) * [4.0, 0.01]  # squares of Student's t
     weight, size = _student(square)
     np.testing.assert_allclose(size, [4.0, 0.01], rtol=0.1)
     assert weight[np.argmax(square[:, 0]), 0] < 0.1 < 1.0 < weight[np.argmin(square[:, 0]), 0]
@@ -49,11 +50,23 @@ def test_joints_that_follow_the_recording_and_short_windows_count_for_nothing():
     assert np.isfinite(_weights(0.0 * errors)[1:, :, [0, 2]]).all()
 
 
-def test_the_gain_is_the_share_of_the_error_that_is_gone():
+def test_the_improvement_is_the_share_of_the_error_that_is_gone():
     errors = np.random.default_rng(0).normal(size=(20, 50, 3))
     errors[:, :5], errors[..., 2] = np.nan, np.nan
-    assert abs(_gain(0.5 * errors, errors) - 0.5) < 1e-9
-    assert abs(_gain(errors, errors)) < 1e-9
+    assert abs(_improvement(0.5 * errors, errors) - 0.5) < 1e-9
+    assert abs(_improvement(errors, errors)) < 1e-9
+
+
+@pytest.mark.parametrize("repeats", [1, 4])
+def test_windows_that_are_wrong_alike_tell_as_much_as_one(repeats):
+    """Of scores with the information's covariance, each `repeats` times over in its motion."""
+    rng, motions, own = np.random.default_rng(3), 4000, np.array([[2.0, 0.5], [0.5, 1.0]])
+    scores = np.repeat(rng.multivariate_normal(np.zeros(2), own, motions), repeats, axis=0)
+    far = np.full(2, np.inf)
+    free = types.SimpleNamespace(precision=np.eye(2), mean=np.zeros(2), low=-far, high=far)
+    given = np.tile(own, (len(scores), 1, 1)), scores, np.arange(motions).repeat(repeats).tolist(), np.zeros(2)
+    told = _information(*given, free)  # pyright: ignore[reportArgumentType]: what it asks of free parameters
+    assert abs(told - 1.0 / repeats) < 0.1 / repeats
 
 
 # --- whole diagnoses -------------------------------------------------------------------------------------------------

@@ -38,7 +38,7 @@ EFFECT = Effect(
     # Typical is what torque constants are known to.
     prior=Prior(typical=0.1, lowest=(1.0 / LARGEST - 1.0,), highest=(LARGEST - 1.0,)),
     export=Export(
-        mjcf="the gear of the actuator",
+        mjcf="the gear of the actuator, or the gains of a position servo",
         in_model=lambda robot, joints, w, shape: with_gear(robot, joints[0], 1.0 / (1.0 + w[0])),
     ),
 )

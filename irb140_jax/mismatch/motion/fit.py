@@ -1,14 +1,14 @@
-"""Numbers of position servos fitted to the motion: the second stage for recordings of commands.
+"""Parameters of position servos fitted to the motion: the second stage for recordings of commands.
 
 Torque of commands follows from positions that the friction itself has shaped, so a law that is not quite right draws
-its numbers away from those that make a simulation move as the robot did.  Here the closed loop is simulated from many
-moments of the recordings, and these are changed until it follows the positions:
+its parameters away from those that make a simulation move as the robot did.  Here the closed loop is simulated from
+many moments of the recordings, and these are changed until it follows the positions:
 
     the amplitudes of what is named, where it acts on a joint and in the simulation; rotors that the torque leaves open;
-    how strong each servo is beside its stated gains; its Kd; the time at which commands act
+    each servo's torque gain beside its stated Kp and Kd; its Kd; the time at which commands act
 
-What the torque says is their prior.  Least squares by Gauss's and Newton's method, with finite differences of MuJoCo's
-simulation.  The numbers are kept where simulations of motions that the fit did not see err less with them.
+What the torque says is their prior.  Gauss-Newton with finite differences of MuJoCo's simulation.  The
+parameters are kept where simulations of motions that the fit did not see err less with them.
 """
 
 import dataclasses
@@ -20,7 +20,7 @@ from scipy import linalg, optimize
 
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file
-from irb140_jax.mismatch.motion.free import Changed, Free
+from irb140_jax.mismatch.motion.free import ChangedModel, FreeParameters
 from irb140_jax.mismatch.motion.inputs import Inputs, time_steps
 from irb140_jax.mismatch.motion.laws import without_those
 from irb140_jax.mismatch.motion.models import Simulated, followers, leading, led, positions_of, simulated_corrected
@@ -30,14 +30,14 @@ from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.recordings.drive import Drive
 
-ROUNDS = 3  # of Gauss's and Newton's method
-SETTLED = 1.0  # of the log posterior: a round that gains less is the last
+ROUNDS = 3  # of Gauss-Newton
+CONVERGED = 1.0  # [nats] of the posterior: a round that gains less is the last
 STEP = 0.5  # prior standard deviations over which slopes are taken: sticking makes a simulation jagged below
-FORGOTTEN = 0.25  # [s] from a start, in which its own error counts most: servos are at their goals by then
-TAILS = 4.0  # degrees of freedom of Student's distribution over windows: Lange, Little and Taylor, JASA 84 (1989)
+SETTLING = 0.25  # [s] in which a servo comes from any start to its goal: errors of the start count most there
+FREEDOM = 4.0  # degrees of Student's distribution over windows: Lange, Little and Taylor, JASA 84 (1989)
 ITERATIONS = 20  # to the size of Student's distribution
-FLOWN = 10.0  # [rad or m] off, a simulation has flown away
-MOST = 8  # changed models that are simulated side by side: memory
+DIVERGED = 10.0  # [rad or m] off, a simulation has flown away
+BATCH = 8  # changed models that are simulated side by side: memory
 TINY = 1e-300
 
 
@@ -46,15 +46,15 @@ class MotionFit:
     """What a fit to the motion has found.
 
     Attributes:
-        model: The corrected model, without discrepancy, its drive as it was; rotors that are not named and the strength
-            of servos, as torque constants, are among its effects.
+        model: The corrected model, without discrepancy, its drive as it was; rotors that are not named and torque
+            gains of servos are among its effects.
         of_fold: The same without what each fold leaves out.
         amplitudes: Of candidates that are named, by their number.
         to_drive: Makes the drive of a recording's.
         later: By how much later commands act [s].
-        strength: Real over stated torque of servos, less one, and its standard deviation, by joint.
+        torque_gains: Real over stated torque of servos, less one, and its standard deviation, by joint.
         rotors: Inertia of rotors that are not named, and its standard deviation, by joint [kg m^2 or kg].
-        gain: Share of the position error on motions that the fit did not see which is gone.
+        improvement: Share of the position error on motions that the fit did not see which is gone.
     """
 
     model: CorrectedModel
@@ -62,9 +62,9 @@ class MotionFit:
     amplitudes: dict[int, np.ndarray]
     to_drive: Callable[[Drive], Drive]
     later: float
-    strength: dict[int, tuple[float, float]]
+    torque_gains: dict[int, tuple[float, float]]
     rotors: dict[int, tuple[float, float]]
-    gain: float
+    improvement: float
 
 
 def fit_to_motion(
@@ -93,28 +93,30 @@ def fit_to_motion(
         return None
     before = motions.of_folds({w.fold: (of_fold(w.fold), lambda drive: drive, 0.0) for w in cut})
     best = None
-    for rotors in dict.fromkeys(((), ex.open)):
-        free, left_out = Free.of(ex, model, data, rotors), {}
+    for rotors in dict.fromkeys(((), ex.open_rotors)):
+        free, left_out = FreeParameters.of(ex, model, data, rotors), {}
         found = _fitted(free, motions)
         for fold in dict.fromkeys(w.fold for w in cut):
             own = free.centred(blocks[fold])
             left_out[fold] = own.model(found.without([w.fold == fold for w in cut], own))
-        gain = _gain(motions.of_folds(left_out), before)
-        if gain > (best.gain if best else 0.0):
-            best = _as_found(free, found, left_out, gain)
+        improvement = _improvement(motions.of_folds(left_out), before)
+        if improvement > (best.improvement if best else 0.0):
+            best = _as_found(free, found, left_out, improvement)
     return best
 
 
-def _as_found(free: Free, found: "_Found", left_out: dict[int, Changed], gain: float) -> MotionFit:
+def _as_found(
+    free: FreeParameters, found: "_Found", left_out: dict[int, ChangedModel], improvement: float
+) -> MotionFit:
     """What is told of a fit."""
     own, spread = free.values(found.x), free.unit * np.sqrt(np.diag(linalg.inv(found.precision)))
-    joint = lambda w: w.at if w.kind == "strength" else free.base.named[w.at].joints[0]  # noqa: E731
-    of_kind = lambda kind: {  # noqa: E731
-        joint(w): (float(x), float(std)) for w, x, std in zip(free.of_what, own, spread, strict=True) if w.kind == kind}
+    joint = lambda w: w.at if w.kind == "torque_gain" else free.base.named[w.at].joints[0]  # noqa: E731
+    told = [*zip(free.parameters, own.tolist(), spread.tolist(), strict=True)]
+    of_kind = lambda kind: {joint(w): (x, std) for w, x, std in told if w.kind == kind}  # noqa: E731
     model, to_drive, later = free.model(found.x)
     return MotionFit(
         model, {k: made for k, (made, _, _) in left_out.items()}, free.amplitudes(own), to_drive, later,
-        of_kind("strength"), of_kind("rotor"), gain,
+        of_kind("torque_gain"), of_kind("rotor"), improvement,
     )  # fmt: skip
 
 
@@ -122,8 +124,8 @@ class _Found(NamedTuple):
     """Where a fit has ended, and the least-squares problem of its last round, by window.
 
     Attributes:
-        x: The numbers, shape (P,).
-        precision: Of the numbers, shape (P, P).
+        x: The parameters, shape (P,).
+        precision: Of the parameters, shape (P, P).
         about: Where slopes were taken, shape (P,).
         share: Of the last step that was gone.
         grams: Slopes times slopes, shape (B, P, P).
@@ -137,9 +139,9 @@ class _Found(NamedTuple):
     share: float
     grams: np.ndarray
     slopes: np.ndarray
-    free: Free
+    free: FreeParameters
 
-    def without(self, windows_: Sequence[bool], free: Free) -> np.ndarray:
+    def without(self, windows_: Sequence[bool], free: FreeParameters) -> np.ndarray:
         """Where it ends without some windows, in that last round, with the prior of `free`."""
         keep = ~np.array(windows_)
         end = _least(self.grams[keep].sum(axis=0), self.slopes[keep].sum(axis=0), self.about, free)
@@ -167,7 +169,7 @@ class _Motions:
         self.given, self.step = given, given.step / given.parts
         self.start, self.speed, self.began, self.drives = given.start, given.speed, given.began, given.drives
         self.true = given.positions()
-        self.true[:, : round(FORGOTTEN / given.step)] = np.nan
+        self.true[:, : round(SETTLING / given.step)] = np.nan
         self.follow, self.missing = None, []
         bare, made = dataclasses.replace(without_those(model), discrepancy=None), simulated_corrected(model, self.step)
         # What happens once or needs a memory acts as a torque, as in the proof.
@@ -175,7 +177,7 @@ class _Motions:
         if missing is not None and made.compiled["corrected"].nv == model.robot.n:
             self.missing, self.follow = missing, followers([made], data.smooth)
 
-    def ready(self, model: Changed) -> _Ready:
+    def ready(self, model: ChangedModel) -> _Ready:
         """A model compiled."""
         assert self.follow is not None
         made = simulated_corrected(model[0], self.step)
@@ -187,7 +189,7 @@ class _Motions:
         """Simulated less recorded positions, NaN where they don't count, (sets, B, T, n); in each set a model a window.
         """
         out = []
-        for group in (sets[i : i + MOST] for i in range(0, len(sets), MOST)):
+        for group in (sets[i : i + BATCH] for i in range(0, len(sets), BATCH)):
             models = [m for one in group for m in one]
             drives = [d and m.to_drive(d) for m, d in zip(models, self.drives * len(group), strict=True)]
             count = len(self.drives)
@@ -201,10 +203,10 @@ class _Motions:
             )[:, :: self.given.parts]  # fmt: skip
             off = went.reshape(len(group), *self.true.shape) - self.true
             off[..., self.follow] = np.nan
-            out.append(np.clip(off, -FLOWN, FLOWN))
+            out.append(np.clip(off, -DIVERGED, DIVERGED))
         return np.concatenate(out)
 
-    def of_folds(self, models: dict[int, Changed]) -> np.ndarray:
+    def of_folds(self, models: dict[int, ChangedModel]) -> np.ndarray:
         """The same with the models of the fold of each window, (B, T, n)."""
         ready = {fold: self.ready(model) for fold, model in models.items()}
         return self.errors([[ready[w.fold] for w in self.given.cut]])[0]
@@ -221,8 +223,8 @@ class _Motions:
         return self.given.between(applied)
 
 
-def _fitted(free: Free, motions: _Motions) -> _Found:
-    """Most probable numbers, from where the torque has them."""
+def _fitted(free: FreeParameters, motions: _Motions) -> _Found:
+    """Most probable parameters, from where the torque has them."""
     size, x = len(free.unit), free.mean
     count = len(motions.given.cut)
     errors_at = lambda xs: motions.errors([[motions.ready(free.model(y))] * count for y in xs])  # noqa: E731
@@ -245,7 +247,7 @@ def _fitted(free: Free, motions: _Motions) -> _Found:
         best = int(np.argmin(lost))
         share = (0.0, *shares)[best]
         x, errors = about + share * (end - about), [errors, *tried][best]
-        if lost[0] - lost[best] < SETTLED:
+        if lost[0] - lost[best] < CONVERGED:
             break
     return _Found(x, grams.sum(axis=0) + free.precision, about, share, grams, along, free)
 
@@ -270,7 +272,7 @@ def _mean_square(errors: np.ndarray) -> np.ndarray:
 
 
 def _information(
-    grams: np.ndarray, along: np.ndarray, folds: Sequence[int], about: np.ndarray, free: Free
+    grams: np.ndarray, along: np.ndarray, folds: Sequence[int], about: np.ndarray, free: FreeParameters
 ) -> float:
     """Share of what the windows seem to say that they do say, as motions differ in what they ask for; at most 1.
 
@@ -295,14 +297,14 @@ def _information(
     return float(min(1.0, np.sum(known * gram) / max(np.sum(known * varies), TINY)))
 
 
-def _cost(free: Free, x: np.ndarray, weight: np.ndarray, errors: np.ndarray) -> float:
+def _cost(free: FreeParameters, x: np.ndarray, weight: np.ndarray, errors: np.ndarray) -> float:
     """Negative log posterior but for a constant."""
     apart = x - free.mean
     return 0.5 * float(np.nansum(weight * errors**2) + apart @ free.precision @ apart)
 
 
-def _least(gram: np.ndarray, along: np.ndarray, about: np.ndarray, free: Free) -> np.ndarray:
-    """Least-squares numbers within their bounds where slopes are those at `about`, shape (P,)."""
+def _least(gram: np.ndarray, along: np.ndarray, about: np.ndarray, free: FreeParameters) -> np.ndarray:
+    """Least-squares parameters within their bounds where slopes are those at `about`, shape (P,)."""
     precision = gram + free.precision
     downhill = precision @ about - along - free.precision @ (about - free.mean)
     root = linalg.cholesky(precision, lower=True)
@@ -311,7 +313,7 @@ def _least(gram: np.ndarray, along: np.ndarray, about: np.ndarray, free: Free) -
     return optimize.lsq_linear(root.T, target, bounds=(low - 1e-9, high + 1e-9), method="bvls").x
 
 
-def _gain(now: np.ndarray, before: np.ndarray) -> float:
+def _improvement(now: np.ndarray, before: np.ndarray) -> float:
     """Share of the position error that is gone, the geometric mean over joints."""
     both = [_student(_mean_square(errors))[1] for errors in (now, before)]
     return 1.0 - float(np.exp(0.5 * np.nanmean(np.log(both[0] / both[1]))))
@@ -327,7 +329,7 @@ def _student(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     weight, size, own = np.full(square.shape, np.nan), np.full(square.shape[1], np.nan), square[:, counts]
     usual = np.maximum(np.nanmedian(own, axis=0), TINY)
     for _ in range(ITERATIONS):
-        heavy = (TAILS + 1.0) / (TAILS + own / usual)
+        heavy = (FREEDOM + 1.0) / (FREEDOM + own / usual)
         usual = np.maximum(np.nanmean(heavy * own, axis=0), TINY)
     weight[:, counts], size[counts] = heavy, usual
     return weight, size

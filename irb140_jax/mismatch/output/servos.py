@@ -163,11 +163,12 @@ def motion_notes(robot: Robot, fit: MotionFit | None) -> list[str]:
     if fit is None:
         return []
     said = [
-        "The numbers of what is named, and of the servos, are those with which a simulation from the commands follows "
-        "the positions best, beside what the torque says of them: on motions that the fit did not see it is nearer to "
-        f"the positions by {100 * fit.gain:.0f} %. Standard deviations hold by how much torque and motion disagree."
+        "The parameters of what is named, and of the servos, are those with which a simulation from the commands "
+        "follows the positions best, beside what the torque says of them: on motions that the fit did not see it is "
+        f"nearer to the positions by {100 * fit.improvement:.0f} %. Standard deviations hold by how much torque and "
+        "motion disagree."
     ]
-    if stronger := _each(robot, fit.strength, lambda x: f"{1.0 + x:.3g}"):
+    if stronger := _each(robot, fit.torque_gains, lambda x: f"{1.0 + x:.3g}"):
         said.append(
             f"By the motion the servos give, in parts of the torque that is stated, {stronger}; corrected.xml has it "
             "in their gains."

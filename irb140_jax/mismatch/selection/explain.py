@@ -206,7 +206,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     ex = Explanation(
         lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
         unproved=start.unproved, times=start.times, payloads=tuple(r.recording.payload for r in start.along),
-        open=left_open,
+        open_rotors=left_open,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
 
@@ -282,7 +282,7 @@ def _first_noise(
 
 def _by_block(ex: Explanation, sensors: np.ndarray) -> Explanation:
     """The explanation with Gram matrices of what it names or leaves open by block of the data, to leave some out."""
-    columns = ex.columns((*ex.chosen, *ex.open))
+    columns = ex.columns((*ex.chosen, *ex.open_rotors))
     joints = grams_by_block(ex.data, ex.extra, ex.noise, sensors, columns, settings.BLOCKS)
     return dataclasses.replace(ex, by_block=dataclasses.replace(ex.space, joints=joints))
 

@@ -48,7 +48,7 @@ class Explanation:
         payloads: What the tool carried in each recording, by which its rows were made.
         rigid: The fit of the inertials alone, from all blocks of the data or all but some: it predicts where nothing is
             named.  None in logs of commands, where drives err beside it.
-        open: Rotors that are not named and that the torque of servos leaves open: a fit to the motion may need them.
+        open_rotors: Rotors that are not named and that the torque of servos leaves open, for a fit to the motion.
     """
 
     lib: Library
@@ -68,7 +68,7 @@ class Explanation:
     times: Times = Times()
     payloads: tuple[Payload | None, ...] = ()
     rigid: Callable[[np.ndarray | None], Posterior] | None = None
-    open: tuple[int, ...] = ()
+    open_rotors: tuple[int, ...] = ()
 
     @property
     def members(self) -> list[Candidate]:
