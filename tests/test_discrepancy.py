@@ -12,6 +12,7 @@ from irb140_jax.mismatch.regression.discrepancy import Discrepancy
 from irb140_jax.mismatch.regression.discrepancy import features as blocks
 from irb140_jax.mismatch.regression.nuisances import BESIDE_FRICTION, SCALED, feature_coefficients, nuisances
 from irb140_jax.recordings.condition import Conditioned
+from irb140_jax.recordings.direction import direction_of
 
 RATE = 200.0
 T = np.arange(0.0, 20.0, 1.0 / RATE)
@@ -75,6 +76,27 @@ def test_friction_that_turns_late_differs_by_what_the_discrepancy_holds(slower):
     """A joint that sticks in a slow reversal leaves with another acceleration than it came with."""
     late = np.interp(T - 0.007 / slower, T, SIGN)
     assert explained(late - SIGN, 1.0, slower=slower) > 0.95
+
+
+def test_friction_that_turns_at_once_however_slow_the_joint_is_held_by_the_block_of_reversals():
+    """A joint that comes to rest, creeps back for some 60 ms and goes on: too slow to tell by the direction alone."""
+    dips = np.sin(np.pi * 0.53 * T) ** 2 - 0.0015
+    q, qd, qdd = 1.2 * np.cumsum(dips) / RATE, 1.2 * dips, 1.2 * np.gradient(dips, T)
+    rest_speed = np.array([0.003 * np.abs(qd).max()])
+    column = lambda x: np.asarray(x)[:, None]  # noqa: E731
+    direction = direction_of(column(qd), column(qdd), np.array([1e-5]), rest_speed, RATE)
+    moves = np.ones((len(T), 1), bool)
+    motion = Conditioned(
+        "dips", T, column(q), column(qd), column(qdd), column(LOAD), moves, moves, rest_speed, np.zeros(1), direction,
+        np.zeros((len(T), 1)), (),
+    )  # fmt: skip
+    one = lambda x: np.array([x])  # noqa: E731
+    scales = Scales(one(qd.max()), rest_speed, one(1.0), one(q.min()), one(q.max()), 20.0, one(0.3), one(0.0))
+    X = blocks(motion, column(LOAD), scales, 0)[-1]
+    X, turned = X[:, X.any(axis=0)], np.sign(qd) - direction[:, 0]
+    w = np.linalg.lstsq(X / np.sqrt(np.mean(X**2, axis=0)), turned, rcond=1e-9)[0]
+    left = turned - X / np.sqrt(np.mean(X**2, axis=0)) @ w
+    assert np.ptp(turned) > 0.5 and np.sum(left**2) < 0.1 * np.sum(turned**2)
 
 
 def test_friction_along_the_range_is_held_by_the_smooth_block():

@@ -63,7 +63,7 @@ def unnamed(joints: int = 3, **sizes) -> dict:
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (with_value(2, "schema"), "schema 2, this version reads and writes schema 4"),
+        (with_value(2, "schema"), "schema 2, this version reads and writes schema 5"),
         (with_value("2", "schema"), "schema '2'"),
         (without("schema"), "no schema"),
         (without("phi_refit"), "'phi_refit' is missing"),

@@ -29,6 +29,12 @@ FACTOR = np.eye(10 * N)
 SENSORS = np.full(N, 1e-3)
 
 
+def in_short_windows(monkeypatch) -> None:
+    """From now on windows are as short as they may be."""
+    for name in ("NEW", "RUN_IN"):
+        monkeypatch.setattr(rows, name, 0)
+
+
 def test_columns_of_some_samples_are_those_of_all():
     whole = columns_along(LIB, ALONG)
     first = columns.RUN_IN + 200  # so that what comes before is not all that there is
@@ -60,7 +66,7 @@ def test_rows_are_the_same_in_windows_of_any_length(laws, monkeypatch):
     lib, along, torques = settled(model)
     at = point(ROBOT, np.zeros(10 * N), model.named if laws else [])
     whole = stretch(lib, along, 0, BAND, FACTOR, torques.loads, at)
-    monkeypatch.setattr(rows, "ROWS", 60)
+    in_short_windows(monkeypatch)
     short = stretch(lib, along, 0, BAND, FACTOR, torques.loads, at)
     for name in ("inertials", "amplitudes", "y", "rigid"):
         one, other = getattr(whole, name), getattr(short, name)
@@ -79,7 +85,7 @@ def the_grams():
 
 def test_sums_over_windows_are_the_sums_over_all_rows(monkeypatch):
     *_, whole = the_grams()
-    monkeypatch.setattr(rows, "ROWS", 60)
+    in_short_windows(monkeypatch)
     *_, short = the_grams()
     for one, other in zip(whole, short, strict=True):
         np.testing.assert_array_equal(one.index, other.index)
@@ -112,7 +118,7 @@ def test_a_diagnosis_does_not_depend_on_what_is_kept(monkeypatch):
     log = dataclasses.replace(LOG, tau=noisy + np.random.default_rng(1).normal(size=noisy.shape) * 0.02)
     whole = diagnose(ROBOT, [log]).diagnosis
     monkeypatch.setattr(columns, "KEPT", 0)
-    monkeypatch.setattr(rows, "ROWS", 150)
+    in_short_windows(monkeypatch)
     long = diagnose(ROBOT, [log]).diagnosis
     names = [[(f.effect, f.joints) for f in found.findings] for found in (whole, long)]
     assert names[0] == names[1] and len(names[0]) == N

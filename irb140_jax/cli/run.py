@@ -1,5 +1,6 @@
 """A command line from its words to its exit code."""
 
+import gc
 import os
 import signal
 import sys
@@ -23,6 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is None:  # the process is ours
         keep_memory()
+        gc.set_threshold(50_000, 20, 20)  # tracing makes millions of objects, of which hardly any is garbage
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # as an exception, so that nothing is left half-written
     try:
         _run(argv)

@@ -92,6 +92,7 @@ def _padded(x: np.ndarray, used: int, room: int) -> np.ndarray:
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK)
 def _loop(kernel: Kernel, given: Any, arrays: list[Array], chunks: Array) -> Array:
     """The first `chunks` chunks of the result; their number is not part of the program."""
+    kernel = jax.jit(kernel, inline=True)  # traced once for its shape and for the loop
     shape = jax.eval_shape(lambda: kernel(given, *_chunk(arrays, 0)))
     result = jnp.zeros((arrays[0].shape[0], *shape.shape[1:]), shape.dtype)
 
@@ -104,6 +105,7 @@ def _loop(kernel: Kernel, given: Any, arrays: list[Array], chunks: Array) -> Arr
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK)
 def _sum_loop(kernel: Kernel, given: Any, arrays: list[Array], chunks: Array) -> Array:
     """Sum over the first `chunks` chunks; their number is not part of the program."""
+    kernel = jax.jit(kernel, inline=True)
     shape = jax.eval_shape(lambda: kernel(given, *_chunk(arrays, 0)))
     step = lambda k, total: total + kernel(given, *_chunk(arrays, k))  # noqa: E731
     return lax.fori_loop(0, chunks, step, jnp.zeros(shape.shape, shape.dtype))

@@ -1,7 +1,9 @@
 """What a robot and every candidate do along a recording: sensitivities and columns."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -26,7 +28,9 @@ from irb140_jax.types import JointSamples
 RUN_IN = 512  # samples in which effects with memory forget how their chunk began: the softest spring rings for 2 s
 TURNS = 32  # turning points before a chunk, by which effects with memory of the path know how it began
 RUN_OUT = 32  # samples ahead that errors of a clock look at
-CHUNK = RUN_IN + 2048 + RUN_OUT  # samples per compiled call: recordings of any length reuse one program
+NEW = 2048  # samples of a compiled call whose columns are exact
+CHUNK = RUN_IN + NEW + RUN_OUT  # samples per compiled call: recordings of any length reuse one program
+BEGUN = os.cpu_count() or 1  # computations beside the one that is waited for
 KEPT = 50_000  # samples of all recordings, some minutes, up to which both are kept instead of evaluated anew: 250 MB
 # Three directions of gravity without a zero or a one, which would each be a program of its own.
 PULLS = np.array([[2.0, 3.0, 5.0], [5.0, 2.0, 3.0], [3.0, 5.0, 2.0]])  # m/s^2
@@ -178,13 +182,15 @@ def _sensitivities(robot: Robot, recording: Conditioned, at: slice, last_link: n
     """See `RigidBody`.  Springs of the model pull at the link; rotors and friction are the motor's."""
     q, qd, qdd = recording.q[at], recording.qd[at], recording.qdd[at]
     parts = lambda r: (r.armature, r.damping, r.frictionloss)  # noqa: E731
-    bare = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 3)
-    torque = partial(_torque, bare)
-    rest, still, unit = torque(q, qd, qdd), np.zeros_like(q), np.eye(robot.n)
-    by_q = np.stack([(torque(q + STEP * e, qd, qdd) - rest) / STEP for e in unit], axis=-1)
-    by_qd = np.stack([(torque(q, qd + STEP * e, qdd) - rest) / STEP for e in unit], axis=-1)
-    held = torque(q, still, still)
-    mass = np.stack([torque(q, still, still + e) - held for e in unit], axis=-1)
+    bare, n = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 3), robot.n
+    still, unit, step = np.zeros_like(q), np.eye(n), STEP * np.eye(n)
+    # In one call, for one of few samples costs as much as one of many.
+    motions = [(q, qd, qdd), (q, still, still), *((q + e, qd, qdd) for e in step), *((q, qd + e, qdd) for e in step)]
+    motions += [(q, still, still + e) for e in unit]
+    torques = _torque(bare, *(np.concatenate(x) for x in zip(*motions, strict=True))).reshape(-1, *q.shape)
+    rest, held, moved = torques[0], torques[1], np.moveaxis(torques[2:], 0, -1)
+    by_q, by_qd = np.split((moved[..., : 2 * n] - rest[..., None]) / STEP, 2, axis=-1)
+    mass = moved[..., 2 * n :] - held[..., None]
     size = np.linalg.norm(np.asarray(robot.gravity))
     tool, tool_jacobian = tool_along(robot, q)
     sides, springs = np.asarray(across(robot.gravity)), np.asarray(robot.stiffness)
@@ -236,7 +242,7 @@ def columns_along(
     dt = float(r.t[-1] - r.t[0]) / (len(r.t) - 1)
     first, last = (0, len(r.t)) if at is None else (at.start, at.stop)
     out = np.empty((last - first, len(lib.entries[0])))
-    for start in range(max(first - RUN_IN, 0), max(last - RUN_IN, 1), CHUNK - RUN_IN - RUN_OUT):
+    for start in range(max(first - RUN_IN, 0), max(last - RUN_IN, 1), NEW):
         piece, pad = slice(start, min(start + CHUNK, len(r.t))), max(start + CHUNK - len(r.t), 0)
         rigid = _each_sample(lambda x, pad=pad: _padded(x, pad), along.rigid_at(piece))
         t, *moving = (_padded(x[piece], pad) for x in per_sample)
@@ -247,11 +253,21 @@ def columns_along(
         motion = Motion(t - r.began, *moving, rate, rigid, *near_rest, turned, asked)  # pyright: ignore[reportArgumentType, reportCallIssue]: NumPy
         begin, end = max(start + RUN_IN if start else 0, first), min(start + CHUNK - RUN_OUT, last)
         # One program for each effect: of all in one, XLA would evaluate parts again and again.
-        effects, column = [_columns(b[0], b[1], b[2], motion) for b in lib.blocks], 0
-        for part in map(np.asarray, effects):
+        column = 0
+        for part in map(np.asarray, _ahead(_columns(b[0], b[1], b[2], motion) for b in lib.blocks)):
             out[begin - first : end - first, column : column + part.shape[1]] = part[begin - start : end - start]
             column += part.shape[1]
     return out
+
+
+def _ahead(computations: Iterator[Array]) -> Iterator[Array]:
+    """Computations, of which the next are begun before one is waited for: few, for their results take memory."""
+    begun: deque[Array] = deque()
+    for computation in computations:
+        begun.append(computation)
+        if len(begun) > BEGUN:
+            yield begun.popleft()
+    yield from begun
 
 
 def _rate(x: np.ndarray, at: slice, dt: float) -> np.ndarray:

@@ -21,7 +21,7 @@ from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 
-SCHEMA = 4  # of model.json; an effect's amplitudes are those of its columns, so it changes where these do
+SCHEMA = 5  # of model.json; an effect's amplitudes are those of its columns, so it changes where these do
 
 
 @dataclasses.dataclass(frozen=True)

@@ -23,7 +23,7 @@ from irb140_jax.recordings.condition import Conditioned
 
 ORDERS = 6  # of the polynomials in position
 SPEEDS = 4  # of the polynomials in the logarithm of speed
-FEATURES = 81  # of all blocks, and dry friction
+FEATURES = 84  # of all blocks, and dry friction
 
 
 @dataclasses.dataclass(frozen=True)
@@ -117,16 +117,25 @@ def _smooth(r: Conditioned, carried: np.ndarray, j: int, position: np.ndarray, s
 
 
 def _reversal(r: Conditioned, carried: np.ndarray, scales: Scales, j: int, rounded: np.ndarray) -> np.ndarray:
-    """What happens around one joint's reversals, shape (T, 35)."""
+    """What happens around one joint's reversals, shape (T, 38)."""
     q, qdd = r.q[:, j], r.qdd[:, j]
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
     base = [_relaxed(q, share * travel) - direction for share in settings.BRISTLE_TRAVELS]
     base += [np.interp(r.t - late, r.t, direction) - direction for late in settings.TURNING_DELAYS]
+    base.append(through_rest(r.qd[:, j], qdd, float(r.rest_speed[j]), r.t) - direction)
     alone = np.stack(base, axis=1)
     X, even = np.concatenate([alone, rounded], axis=1), np.abs(carried)[:, None]
     pushed = np.abs(qdd)[:, None] / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
     return np.concatenate([alone, X * even, X * pushed], axis=1)
+
+
+def through_rest(qd: np.ndarray, qdd: np.ndarray, rest_speed: float, t: np.ndarray) -> np.ndarray:
+    """The sign of the smoothed speed however slow, as a mean over the time that a sample stands for, shape (T,)."""
+    fine, reach = 0.02 * rest_speed, 0.5 * np.abs(qdd) * np.gradient(t)
+    wide = np.maximum(reach, fine)
+    smooth = lambda v: np.hypot(v, fine)  # noqa: E731
+    return (smooth(qd + wide) - smooth(qd - wide)) / (2.0 * wide)
 
 
 def _relaxed(q: np.ndarray, travel: float) -> np.ndarray:

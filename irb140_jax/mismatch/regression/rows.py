@@ -5,18 +5,28 @@ the rows.  Held are those of the inertials, and of the few candidates that an ex
 """
 
 import dataclasses
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from irb140_jax.mismatch.columns.along import Loads, Prepared, columns_along, tool_along, unbounded, without
+from irb140_jax.mismatch.columns.along import (
+    NEW,
+    RUN_IN,
+    Loads,
+    Prepared,
+    columns_along,
+    tool_along,
+    unbounded,
+    without,
+)
 from irb140_jax.mismatch.columns.candidates import Candidate, Library
 from irb140_jax.mismatch.columns.torques import library_of
 from irb140_jax.mismatch.regression.tangent import Point, counted_twice, leaning, logged, regressor
 from irb140_jax.recordings.low_pass import Band
 
-ROWS = 1024  # of a window
+FEWEST = 64  # rows of a window, however long the low-pass
 MARGIN = 0.25  # [s] on either side of a window, in which laws of the log look for what they pass on
 
 
@@ -124,10 +134,16 @@ class Window(NamedTuple):
 
 
 def row_windows(band: Band, samples: int, margin: int = 0, overlap: int = 0) -> Iterator[Window]:
-    """All rows of a recording of so many samples, some at a time; each but the first with some of those before."""
+    """All rows of a recording of so many samples, some at a time; each but the first with some of those before.
+
+    As many as one compiled call makes the columns of: more take more memory and no less time.
+    """
     taps, count = len(band.low_pass()), len(band.kept(samples))
-    for new in range(0, count, ROWS):
-        rows = slice(max(new - overlap, 0), min(new + ROWS, count))
+    many = lambda at_once: max((at_once - taps - 2 * margin) // band.step - overlap, FEWEST)  # noqa: E731
+    # Nothing has to be run in before the first.
+    edges = [0, *range(many(NEW + RUN_IN), count, many(NEW)), count]
+    for new, end in itertools.pairwise(edges):
+        rows = slice(max(new - overlap, 0), end)
         first, last = rows.start * band.step, (rows.stop - 1) * band.step + taps
         yield Window(rows, new, slice(max(first - margin, 0), min(last + margin, samples)), first)
 
