@@ -13,7 +13,7 @@ from irb140_jax.effects.position_dependent_friction import _finer
 from irb140_jax.mismatch.regression.gram import START
 from irb140_jax.mismatch.selection import explain as loop
 from irb140_jax.mismatch.selection.explain import explain
-from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.condition import conditioned
@@ -156,6 +156,29 @@ def test_a_delay_that_was_found_may_be_any_in_the_next_round(monkeypatch):
     (index,) = [i for i, m in zip(ex.chosen, ex.members, strict=True) if m.slug == "time_delay"]
     assert ex.data.candidates[index].shape[0] == pytest.approx(2.5 * step, rel=0.05)
     assert len(bounds) >= FEWEST and bounds[0].all() and not np.any(bounds[1:])
+
+
+def test_what_slopes_rest_on_is_held_where_it_is_chosen_without_them_too(monkeypatch):
+    """At a point that has the delay, five skewed channels may look better: slopes there say nothing of them."""
+    logs, arm = [rubbing(seed, 0.0, WIDTH) for seed in (4, 5)], robot()
+    late = [dataclasses.replace(r, tau=np.roll(r.tau, -5, axis=0)) for r in logs]
+    band = choose_band(late, arm)
+    effects = (CATALOGUE["coulomb_friction"], CATALOGUE["time_delay"])
+    found = lambda: explain(arm, conditioned(late, band), band, effects, 0.05, np.full(3, 0.002))  # noqa: E731
+    delay = lambda ex: float(fitted(ex.data, ex.posterior(), ex.chosen, ex.factor)[2][-1][0])  # noqa: E731
+    usual, real, asked = found(), loop.selected, []
+
+    def once_without_it(space, chosen, **kwargs):
+        best, hyper, sets = real(space, chosen, **kwargs)
+        losing = chosen and kwargs["every_move"] and "lost" not in asked
+        asked.append("lost" if losing else kwargs.get("held", "free"))
+        return tuple(i for i in best if not losing or space.candidates[i].slug != "time_delay"), hyper, sets
+
+    monkeypatch.setattr(loop, "selected", once_without_it)
+    ex = found()
+    assert asked[-3:] == ["lost", "free", {("time_delay", (0, 1, 2))}]
+    assert [m.slug for m in ex.members] == [m.slug for m in usual.members] and usual.members[-1].slug == "time_delay"
+    assert delay(ex) == pytest.approx(delay(usual), rel=1e-3)
 
 
 def grid_of_stretches() -> np.ndarray:

@@ -19,6 +19,7 @@ from irb140_jax.mismatch.selection.hyperparameters import over_shapes, settled
 from irb140_jax.mismatch.selection.kinds import Kinds
 from irb140_jax.mismatch.selection.screening import gains, reshaped
 from irb140_jax.mismatch.selection.search import Search
+from irb140_jax.mismatch.selection.selected import selected
 
 ROWS, INERTIALS, COMMON, OWN = 60, 3, 1, 5
 SLUGS = ("coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia")
@@ -287,6 +288,25 @@ def test_the_search_finds_what_was_planted_and_is_sure_of_it(true):
     for c, candidate in enumerate(space.candidates):
         p = sure.get((candidate.slug, candidate.joints), 0.0)
         assert p > 0.99 if c in true else p < 0.3, (candidate.slug, candidate.joints, p)
+
+
+def test_a_member_that_moves_nothing_is_removed_though_the_set_without_it_was_judged_by_worse_sizes():
+    space, _ = planted(5, {2: 2.0})
+    worse = ((6, 6, 6, len(LEVELS) - 1),) * 2
+    search = Search(space, ((0, 0, 0, ONE),) * 2)
+    search.visited[frozenset({2})] = space.log_evidence((2,), worse), worse
+    assert search.visited[frozenset({2})][0] < search.judged((1, 2), search.start) - 1.0
+    assert search.run((1, 2)) == (2,)
+
+
+def test_what_a_search_holds_is_in_every_set_it_returns():
+    """Two laws that are not there, one of which is held; what is there is found beside it."""
+    space, _ = planted(5, {2: 2.0})
+    held = frozenset({(space.candidates[0].slug, (0,))})
+    free, _, every = selected(space, (0, 1))
+    best, _, sets = selected(space, (0, 1), held=held)
+    assert free == (2,) and best == (0, 2)
+    assert all(0 in chosen for chosen in sets) and frozenset(best) in sets and not all(0 in chosen for chosen in every)
 
 
 def test_amplitudes_that_are_not_admissible_make_a_set_impossible():

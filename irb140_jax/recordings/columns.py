@@ -157,7 +157,8 @@ def scaled(
         if channel not in scale and isinstance(unit, str) and UNITS.get(unit) != 1.0:
             converted.setdefault(unit, []).append(channel)
         with np.errstate(over="ignore", invalid="ignore"):  # broken numbers are found later, with their row
-            result[channel] = result[channel] * _factor(channel, unit, columns)
+            factor = _factor(channel, unit, columns)
+            result[channel] = result[channel] if factor == 1.0 else result[channel] * factor
     notes += [f"Converted from {unit}, by the file's own header: {', '.join(channels)}"
               for unit, channels in converted.items()]
     _to_joint_side(result, columns)

@@ -131,21 +131,25 @@ def condition(recording: Recording, band: Band, *, pad: bool = False) -> Conditi
     raw_rate = (len(t) - 1) / (t[-1] - t[0])
     h, h1, h2 = kernels(band.position, raw_rate)
     half = (len(h) - 1) // 2
-    unsure = _between(tau, band, raw_rate)
     anti_alias = kernels(min(0.4 * band.rate, 0.45 * raw_rate), raw_rate)[0]
     white = white_density(recording, raw_rate)
     compared = np.convolve(h2, kernels(min(band.torque, 0.45 * raw_rate), raw_rate)[0])  # as accelerations are
     q, (speed_noise, shaken) = without_noise(q, white, raw_rate, (h1, compared), resampled=t is not recording.t)
-    smoothed = [convolved(q, k) for k in (h, h1, h2)]
-    tau = filtered(tau, anti_alias)
     keep = slice(None) if pad else slice(half, len(t) - half)
     grid = np.arange(t[keep][0], t[keep][-1] + 1e-9, 1.0 / band.rate)
-    q, qd, qdd, tau, unsure = (_at(grid, t, x) for x in (*smoothed, tau, unsure))
-    tau = tau if has_torque else np.full_like(tau, np.nan)
-    hidden = np.maximum(3.0 * speed_noise, 1e-6)
-    rest_speed = np.maximum(hidden, 0.003 * np.abs(qd).max(axis=0, initial=0.0))
-    direction = filtered(direction_of(smoothed[1], smoothed[2], hidden, rest_speed, raw_rate), anti_alias)
-    direction = _at(grid, t, direction)
+    hidden, of_joints = np.maximum(3.0 * speed_noise, 1e-6), []
+    for j in range(q.shape[1]):  # one at a time: an hour's samples of all joints, some dozen times, fill the memory
+        one = slice(j, j + 1)
+        smoothed, torque = [convolved(q[:, one], k) for k in (h, h1, h2)], tau[:, one]
+        series = (*smoothed, filtered(torque, anti_alias), _between(torque, band, raw_rate))
+        on_grid = [_at(grid, t, x) for x in series]
+        rest = np.maximum(hidden[one], 0.003 * np.abs(on_grid[1]).max(axis=0, initial=0.0))
+        direction = filtered(direction_of(smoothed[1], smoothed[2], hidden[one], rest, raw_rate), anti_alias)
+        of_joints.append((*on_grid, _at(grid, t, direction), rest[None]))
+    q, qd, qdd, torque, unsure, direction, (rest_speed,) = (
+        np.concatenate(x, axis=1) for x in zip(*of_joints, strict=True)
+    )
+    tau = torque if has_torque else np.full_like(torque, np.nan)
     stuck = _at(grid, recording.t, _within_a_step(recording).astype(float))
     resting = _widened(np.maximum(_held(np.abs(qd) < rest_speed, band.rate), stuck), band.rate)
     # A gap spoils what the smoother and, later, the low-pass reach from it; half their length holds most of that.
@@ -247,12 +251,14 @@ def _despiked(tau: np.ndarray) -> tuple[np.ndarray, int]:
     What several samples or several joints show is no error of the log: a gear's blow lasts 10 to 30 ms and shakes the
     arm.  Rows of nothing but zeros are.
     """
-    padded = np.pad(tau, ((2, 2), (0, 0)), mode="edge")
-    near = np.stack([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]])
-    middle = 0.5 * (near[1] + near[2])
-    off = np.abs(tau - middle)
-    # Of a coarse channel most samples equal their neighbours, which makes no spike of its least step.
-    usual = [1.4826 * np.median(x[x > 0.0]) if x.any() else 0.0 for x in off.T]
-    spike = (off > OUTLIER * np.array(usual)) & (off > LONE * np.ptp(near, axis=0))
+    spike, middle = np.zeros(tau.shape, dtype=bool), np.empty_like(tau)
+    for j, own in enumerate(tau.T):
+        padded = np.pad(own, 2, mode="edge")
+        near = np.stack([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]])
+        middle[:, j] = 0.5 * (near[1] + near[2])
+        off = np.abs(own - middle[:, j])
+        # Of a coarse channel most samples equal their neighbours, which makes no spike of its least step.
+        usual = 1.4826 * np.median(off[off > 0.0]) if off.any() else 0.0
+        spike[:, j] = (off > OUTLIER * usual) & (off > LONE * np.ptp(near, axis=0))
     spike &= (spike.sum(axis=1, keepdims=True) == 1) | ~tau.any(axis=1, keepdims=True)
     return np.where(spike, middle, tau), int(spike.sum())

@@ -44,18 +44,21 @@ def glance(recording: Recording) -> Glance:
     step = grid[1] - grid[0]
     sos = signal.butter(2, min(CUTOFF, 0.2 / step) * 2 * step, output="sos")
 
-    def smooth(x: np.ndarray) -> np.ndarray:
-        even = np.stack([np.interp(grid, t, x[:, j]) for j in range(x.shape[1])], axis=1)
-        return signal.sosfiltfilt(sos, even, axis=0, padlen=min(len(grid) - 1, round(ENDS / step)))
-
-    q = smooth(recording.q)
-    qd = np.gradient(q, step, axis=0)
-    qdd = np.gradient(qd, step, axis=0)
     ends = min(round(ENDS / step), len(grid) // 10)
     picked = np.linspace(ends, len(grid) - 1 - ends, SAMPLES).round().astype(int)
-    thin = lambda x: x[picked]  # noqa: E731
-    return Glance(
-        thin(q), thin(qd), thin(qdd), thin(smooth(recording.tau) if recording.has_torque else np.full_like(q, np.nan)),
-        None if recording.qd is None else thin(smooth(recording.qd)),
-        None if recording.qdd is None else thin(smooth(recording.qdd)), np.ptp(q, axis=0), thin(grid),
-    )
+
+    def smooth(x: np.ndarray) -> np.ndarray:
+        return signal.sosfiltfilt(sos, np.interp(grid, t, x), padlen=min(len(grid) - 1, round(ENDS / step)))
+
+    def seen(x: np.ndarray | None) -> np.ndarray | None:
+        return None if x is None else np.stack([smooth(own)[picked] for own in x.T], axis=1)
+
+    (q, qd, qdd), travel = np.empty((3, SAMPLES, recording.q.shape[1])), np.empty(recording.q.shape[1])
+    for j, own in enumerate(recording.q.T):
+        position = smooth(own)
+        speed = np.gradient(position, step)
+        q[:, j], qd[:, j], qdd[:, j] = (x[picked] for x in (position, speed, np.gradient(speed, step)))
+        travel[j] = np.ptp(position)
+    tau = seen(recording.tau if recording.has_torque else None)
+    tau = np.full_like(q, np.nan) if tau is None else tau
+    return Glance(q, qd, qdd, tau, seen(recording.qd), seen(recording.qdd), travel, grid[picked])

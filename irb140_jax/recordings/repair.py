@@ -22,26 +22,28 @@ Table = dict[str, np.ndarray]
 
 def without_repeated_rows(table: Table, rows: np.ndarray, notes: list[str]) -> tuple[Table, np.ndarray]:
     """Drop rows that repeat the row before in every column, the time included."""
-    stacked = np.stack(list(table.values()), axis=1)
-    same = (stacked[1:] == stacked[:-1]) | (np.isnan(stacked[1:]) & np.isnan(stacked[:-1]))
-    repeated = np.concatenate([[False], same.all(axis=1)]) & np.isfinite(table["t"])
+    repeated = np.isfinite(table["t"])
+    repeated[:1] = False
+    for x in table.values():
+        repeated[1:] &= (x[1:] == x[:-1]) | (np.isnan(x[1:]) & np.isnan(x[:-1]))
     if repeated.any():
         notes.append(f"{_count(repeated.sum(), 'row')} repeating the row before in every column, the first at row "
                      f"{rows[repeated][0]}, left out")
-    return {name: values[~repeated] for name, values in table.items()}, rows[~repeated]
+        table, rows = {name: values[~repeated] for name, values in table.items()}, rows[~repeated]
+    return table, rows
 
 
 def without_absurd_values(table: Table, used: list[str]) -> Table:
     """Values of the used channels beyond `LARGEST` as missing ones."""
-    absurd = lambda values: np.abs(values) > LARGEST  # noqa: E731
-    return table | {name: np.where(absurd(table[name]), np.nan, table[name]) for name in used if name != "t"}
+    absurd = {name: np.abs(table[name]) > LARGEST for name in used if name != "t"}
+    return table | {name: np.where(x, np.nan, table[name]) for name, x in absurd.items() if x.any()}
 
 
 def without_missing_ends(
     table: Table, used: list[str], rows: np.ndarray, notes: list[str]
 ) -> tuple[Table, np.ndarray]:
     """Cut off rows at both ends in which a used channel has no value yet or any more."""
-    complete = np.flatnonzero(np.isfinite(np.stack([table[name] for name in used], axis=1)).all(axis=1))
+    complete = np.flatnonzero(np.logical_and.reduce([np.isfinite(table[name]) for name in used]))
     if not len(complete):
         return table, rows
     first, last = int(complete[0]), int(complete[-1])

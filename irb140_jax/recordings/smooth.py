@@ -95,8 +95,9 @@ def _goes_on(x: np.ndarray, rate: float, reach: int, at: np.ndarray, weights: np
     for _ in range(ROUNDS):
         longer[reach : reach + len(x)] = x
         trend = np.linspace(longer[0], longer[-1], len(longer))
-        spectrum = np.fft.rfft(longer - trend, axis=0)
-        longer = np.fft.irfft(_weighted(spectrum, f, at, weights), len(longer), axis=0) + trend
+        longer -= trend
+        longer = np.fft.irfft(_weighted(np.fft.rfft(longer, axis=0), f, at, weights), len(longer), axis=0)
+        longer += trend
     return longer
 
 

@@ -13,6 +13,7 @@ Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
 """
 
 import dataclasses
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -70,8 +71,8 @@ class Discrepancy:
         return Discrepancy(Scales(**sizes), np.array(data["coefficients"], dtype=float))
 
 
-def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> list[np.ndarray]:
-    """The four blocks of one joint, each (T, features).
+def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> Iterator[np.ndarray]:
+    """The four blocks of one joint, each (T, features), made one by one: of a long recording each is large.
 
     Args:
         r: T samples of n joints.
@@ -86,8 +87,10 @@ def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> list[n
     speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
     rounded, tails = by_speed(r.qd[:, j], r.direction[:, j], float(scales.speed[j]))
     carried = load[:, j] / max(float(scales.torque[j]), 1e-12)
-    smooth, reversal = _smooth(r, carried, j, position, speed), _reversal(r, carried, scales, j, rounded)
-    return [position[:, 1:], np.concatenate([rounded, tails], axis=1), smooth, reversal]
+    yield position[:, 1:]
+    yield np.concatenate([rounded, tails], axis=1)
+    yield _smooth(r, carried, j, position, speed)
+    yield _reversal(r, carried, scales, j, rounded)
 
 
 def by_speed(qd: np.ndarray, direction: np.ndarray, top: float) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,7 @@
 """Columns of the discrepancy and of nuisance parameters with stated prior widths, such as errors of the instrument."""
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -128,8 +129,9 @@ def nuisances(
             fixed = np.concatenate([np.stack(fixed, axis=1), servo_columns(motion, j)], axis=1)
             fast = motion.qd[:, [j]] / scales.speed[j]  # levels of dry and viscous friction about a law's
             slope = np.concatenate([motion.direction[:, [j]] * own, fast * own], axis=1)
-            scaled = [late(at, x, np.full(x.shape[1], j), dt) for x in (*features(motion, load, scales, j), slope)]
-            joints.append([band.apply(b) for b in (fixed, *scaled)])
+            blocks = itertools.chain(features(motion, load, scales, j), [slope])
+            scaled = (late(at, x, np.full(x.shape[1], j), dt) for x in blocks)
+            joints.append([band.apply(b) for b in itertools.chain([fixed], scaled)])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
     units, dry = [], []
@@ -159,6 +161,7 @@ def nuisances(
         group[len(FIXED) : raw[0][j][0].shape[1]] = DRIVE
         for r in range(count):
             out[r][0].append(np.concatenate(raw[r][j], axis=1))
+            raw[r][j].clear()
             out[r][1].append(group)
     return [
         Nuisances(c, tuple(own), tuple(g), tuple(units), tuple(dry)) for c, (own, g) in zip(commons, out, strict=True)

@@ -188,10 +188,15 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     sites = [site_of(c) for c in data.candidates]
     barred = [start.dropped.count(site) >= OFTEN or site in start.unproved for site in sites]
     without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
-    best, hyper, sets = selected(without_barred, chosen, every_move=start.whole)
+    search = partial(selected, without_barred, chosen, every_move=start.whole)
+    best, hyper, sets = search()
     if at and not at.rests_on <= _sites(data, best):
-        # Under leaning gravity that nothing is named for, inertials can stand for the tilt.
-        return _explained(given, dataclasses.replace(start, at=None))
+        # Slopes at an explanation say nothing of one without what it rests on: under leaning gravity that nothing is
+        # named for, inertials can stand for the tilt.
+        free, last = _explained(given, dataclasses.replace(start, at=None))
+        if not at.rests_on <= _sites(free.data, free.chosen):
+            return free, last
+        best, hyper, sets = search(held=at.rests_on)
     falling = partial(with_falling_friction, space, data, extra[0], given.scales)
     found, found_hyper, falls = falling(best, hyper)
     last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))

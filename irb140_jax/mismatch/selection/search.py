@@ -7,6 +7,7 @@ import numpy as np
 
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
+from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.screening import gains, reshaped
@@ -21,10 +22,11 @@ class Search:
     Args:
         space: What may be in a set.
         hyper: Where sizes and levels start.
+        held: Effects that are in every set that the search goes to.
     """
 
-    def __init__(self, space: Space, hyper: Hyper):
-        self.space, self.start = space, hyper
+    def __init__(self, space: Space, hyper: Hyper, held: frozenset[Site] = frozenset()):
+        self.space, self.start, self.held = space, hyper, held
         alone = len(space.joints) == 1
         whole = [len(c.joints) == len(space.joints) and not alone for c in space.candidates]
         self._sites = [[i for i, c in enumerate(space.candidates) if j in c.joints and not whole[i]]
@@ -71,6 +73,10 @@ class Search:
             if now == before:
                 return tuple(sorted(now))
 
+    def holds(self, chosen: frozenset[int]) -> bool:
+        """Whether a set has what has to be in every one."""
+        return not self.held or self.held <= {site_of(self._of(i)) for i in chosen}
+
     def _value(self, chosen: frozenset[int]) -> float:
         return self.visited[chosen][0]
 
@@ -81,7 +87,7 @@ class Search:
         hyper, best = self.visited[now][1], now
         for other, joints in others:
             other = self._possible(other, hyper, joints)
-            if self._value(other) > self._value(best) + (LEAST if best == now else 0.0):
+            if self.holds(other) and self._value(other) > self._value(best) + (LEAST if best == now else 0.0):
                 best = other
         return best
 
@@ -158,7 +164,13 @@ class Search:
         return self._best(now, ((now | {i}, self._joints(i)) for i in tries))
 
     def _removed(self, now: frozenset[int]) -> frozenset[int]:
-        return self._best(now, ((now - {c}, self._joints(c)) for c in now))
+        fewer, hyper = [(now - {c}, self._joints(c)) for c in now], self.visited[now][1]
+        for rest, joints in fewer:
+            # Judged from other sizes it may have stopped at worse ones: a member that moves nothing would look better.
+            members = tuple(sorted(rest))
+            if rest in self.visited and self.space.log_evidence(members, hyper) > self._value(rest):
+                self.visited[rest] = settled(self.space, members, hyper, sorted(joints))
+        return self._best(now, fewer)
 
     def _exchanged(self, now: frozenset[int]) -> frozenset[int]:
         """One or two members at a joint for one or two others there."""

@@ -9,7 +9,7 @@ from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gram import START, own_scale
 from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals, ridge
 from irb140_jax.mismatch.regression.nuisances import Nuisances
-from irb140_jax.mismatch.selection.averages import Sets, in_its_place
+from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.search import Search
@@ -18,7 +18,7 @@ FREE = (*([len(settings.DISCREPANCY_SIZES) - 1] * (len(START) - 1)), START[-1]) 
 
 
 def selected(
-    space: Space, chosen: Sequence[int] = (), *, every_move: bool = True
+    space: Space, chosen: Sequence[int] = (), *, every_move: bool = True, held: frozenset[Site] = frozenset()
 ) -> tuple[tuple[int, ...], Hyper, Sets]:
     """Search for the best set.
 
@@ -26,13 +26,14 @@ def selected(
         space: What may be in a set.
         chosen: Where the search starts.
         every_move: See `Search.run`.
+        held: Effects that are in every set.
 
     Returns:
         The best set, sizes and levels beside it, and the log posterior of every set visited.
     """
-    search = Search(space, (START,) * len(space.joints))
+    search = Search(space, (START,) * len(space.joints), held)
     best = search.run(chosen, every_move=every_move)
-    return best, search.visited[frozenset(best)][1], {s: v for s, (v, _) in search.visited.items()}
+    return best, search.visited[frozenset(best)][1], {s: v for s, (v, _) in search.visited.items() if search.holds(s)}
 
 
 def named(space: Space, best: tuple[int, ...], hyper: Hyper, sets: Sets) -> tuple[tuple[int, ...], Hyper]:
