@@ -119,7 +119,8 @@ def test_the_limit_found_is_the_force_range_of_the_servo_in_the_file(diagnosed, 
     (found,) = (n.shape[0] for n in result.model.named if n.effect.slug == "torque_saturation")
     # It is found in torque of the stated gains; the file has what the motor gives, gains and limit alike.
     strength = model.actuator_gainprm[0, 0] / KP[0]
-    assert model.actuator_forcerange[0, 1] == pytest.approx(found * strength) and strength == pytest.approx(1.0, abs=0.02)
+    assert strength == pytest.approx(1.0, abs=0.02)
+    assert model.actuator_forcerange[0, 1] == pytest.approx(found * strength)
 
 
 def test_without_commands_a_prediction_is_the_torque_that_is_given(diagnosed):
