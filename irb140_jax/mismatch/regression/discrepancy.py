@@ -134,7 +134,13 @@ def _reversal(r: Conditioned, carried: np.ndarray, scales: Scales, j: int, round
 
 
 def through_rest(qd: np.ndarray, qdd: np.ndarray, rest_speed: float, t: np.ndarray) -> np.ndarray:
-    """The sign of the smoothed speed however slow, as a mean over the time that a sample stands for, shape (T,)."""
+    """The sign of the smoothed speed however slow, as a mean over the time that a sample stands for, shape (T,).
+
+    Args:
+        qd, qdd: Speed and acceleration of one joint, shape (T,) [rad/s or m/s; rad/s^2 or m/s^2].
+        rest_speed: Speed that noise hides; a fiftieth of it is none [rad/s or m/s].
+        t: Time [s], shape (T,).
+    """
     fine, reach = 0.02 * rest_speed, 0.5 * np.abs(qdd) * np.gradient(t)
     wide = np.maximum(reach, fine)
     smooth = lambda v: np.hypot(v, fine)  # noqa: E731
