@@ -46,7 +46,8 @@ def row(line: dict[str, Any]) -> str:
     parts += [f"{kind}: {how}" for kind, how in dict(scoring.located(line)).items()]
     if gains := scoring.gains(line):
         parts.append(f"gains within 5 %: {sum(gains)} of {len(gains)}")
-    at = [f"{','.join(u['joints'])} {100 * u['share']:.0f} %" for u in said["unexplained"]]
+    share = lambda u: "" if u["share"] is None else f" {100 * u['share']:.0f} %"  # noqa: E731
+    at = [f"{','.join(u['joints'])}{share(u)}" for u in said["unexplained"]]
     parts.append(f"unexplained: {'; '.join(at) or 'none'}")
     floors = scoring.floors(line)
     parts.append(f"noise stated over the sensors': median {np.median(floors):.3g}, largest {np.max(floors):.3g}")

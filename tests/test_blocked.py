@@ -67,6 +67,12 @@ def test_a_joint_that_rests_at_an_end_of_its_range_need_not_be_blocked(tau):
     assert not blocked(robot(FLAT), [recorded(q, np.where(rests, tau, servo(q)))])
 
 
+def test_a_spring_that_pushes_back_at_the_end_of_the_range_is_no_stop():
+    q = np.clip(WANTED, -0.5, 0.5)
+    torque = 20.0 * (2.0 * q) ** 15 + FRICTION * np.sign(np.gradient(q, DT))
+    assert not blocked(robot(FLAT), [recorded(q, torque)])
+
+
 def test_a_brake_in_the_middle_of_the_range_is_no_stop():
     q = np.where(T < 5.0, 0.0, WANTED)
     assert not blocked(robot(FLAT), [recorded(q, np.where(T < 5.0, -20.0, servo(q)))])

@@ -65,14 +65,14 @@ def interval_90(value: float | None, std: float | None) -> str:
 
 
 def percent(share: float | None) -> str:
-    """A share in per cent: no decimals above ten, and never rounded up to a certainty."""
+    """A share in per cent: no decimals above ten, and never a certainty: what a float holds as one is rounded, too."""
     if share is None or not math.isfinite(share):
         return "–"
-    if 0.9995 <= share < 1.0:
+    if share >= 0.9995:
         return "> 99.9 %"
     if 0.0 < share < 0.0005:
         return "< 0.1 %"
-    decimals = 0 if 0.1 <= abs(share) < 0.99 or share in (0.0, 1.0) else 1
+    decimals = 0 if 0.1 <= abs(share) < 0.99 or share == 0.0 else 1
     return f"{100 * share:.{decimals}f} %".replace("-", "−")
 
 

@@ -126,25 +126,22 @@ def _reversal(r: Conditioned, carried: np.ndarray, scales: Scales, j: int, round
     direction = r.direction[:, j]
     base = [_relaxed(q, share * travel) - direction for share in settings.BRISTLE_TRAVELS]
     base += [np.interp(r.t - late, r.t, direction) - direction for late in settings.TURNING_DELAYS]
-    base.append(through_rest(r.qd[:, j], qdd, float(r.rest_speed[j]), r.t) - direction)
+    base.append(through_rest(r.qd[:, j], qdd, r.t) - direction)
     alone = np.stack(base, axis=1)
     X, even = np.concatenate([alone, rounded], axis=1), np.abs(carried)[:, None]
     pushed = np.abs(qdd)[:, None] / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
     return np.concatenate([alone, X * even, X * pushed], axis=1)
 
 
-def through_rest(qd: np.ndarray, qdd: np.ndarray, rest_speed: float, t: np.ndarray) -> np.ndarray:
+def through_rest(qd: np.ndarray, qdd: np.ndarray, t: np.ndarray) -> np.ndarray:
     """The sign of the smoothed speed however slow, as a mean over the time that a sample stands for, shape (T,).
 
     Args:
         qd, qdd: Speed and acceleration of one joint, shape (T,) [rad/s or m/s; rad/s^2 or m/s^2].
-        rest_speed: Speed that noise hides; a fiftieth of it is none [rad/s or m/s].
         t: Time [s], shape (T,).
     """
-    fine, reach = 0.02 * rest_speed, 0.5 * np.abs(qdd) * np.gradient(t)
-    wide = np.maximum(reach, fine)
-    smooth = lambda v: np.hypot(v, fine)  # noqa: E731
-    return (smooth(qd + wide) - smooth(qd - wide)) / (2.0 * wide)
+    reach = 0.5 * np.abs(qdd) * np.gradient(t)  # of the speed within that time, either way
+    return np.divide(qd, reach, out=np.sign(qd), where=np.abs(qd) < reach)
 
 
 def _relaxed(q: np.ndarray, travel: float) -> np.ndarray:

@@ -48,24 +48,39 @@ def blocked(robot: Robot, recordings: Sequence[Conditioned]) -> list[Blocked]:
         much = settings.ABOVE_NOISE * float(np.sqrt(np.mean(moving**2)))
         travelled = np.concatenate([r.q[r.recorded[:, j], j] for r in recordings])
         low, high = float(travelled.min()), float(travelled.max())
+        gives = settings.STOP_GIVES * (high - low)
         for end, way in ((low, -1.0), (high, 1.0)):
-            times, held = [], []
+            times, held, beside = [], [], []
             for i, r in enumerate(recordings):
-                there = np.abs(r.q[:, j] - end) < settings.STOP_GIVES * (high - low)
+                off = np.abs(r.q[:, j] - end)
+                there = off < gives
                 stands = there & r.recorded[:, j] & ~r.usable[:, j] & (way * r.tau[:, j] > much)
+                beside.append(_at(r, np.flatnonzero(~there & (off < 2.0 * gives) & r.recorded[:, j])))
                 for first, last in _runs(there):
                     rows = first + np.flatnonzero(stands[first:last])
                     if len(rows) * (r.t[1] - r.t[0]) > settings.EVENT_MARGIN:
                         times.append((i, float(r.t[first]), float(r.t[last - 1])))
-                        held.append(np.stack([x[rows] for x in (r.q, r.qd, r.qdd, r.tau)]))
-            if not times:
-                continue
-            rows = np.concatenate(held, axis=1)
-            q, qd, qdd, tau = rows[:, np.linspace(0, rows.shape[1] - 1, SAMPLES).astype(int)]
-            beyond = way * (tau - nominal_torques(robot, q, qd, qdd).total)[:, j]
-            if np.median(beyond) > much:
+                        held.append(_at(r, rows))
+            beyond = way * _beyond(robot, held, j)
+            # A spring, or a model that is wrong there, pushes back nearly as much just before the end.
+            sudden = np.median(beyond) > 2.0 * np.median(way * _beyond(robot, beside, j))
+            if times and sudden and np.median(beyond) > much:
                 out.append(Blocked(j, end, tuple(times), float(beyond.max()), much / settings.ABOVE_NOISE))
     return out
+
+
+def _at(r: Conditioned, rows: np.ndarray) -> np.ndarray:
+    """Motion and torque in some rows, shape (4, rows, n)."""
+    return np.stack([x[rows] for x in (r.q, r.qd, r.qdd, r.tau)])
+
+
+def _beyond(robot: Robot, parts: Sequence[np.ndarray], j: int) -> np.ndarray:
+    """Torque of one joint beyond what the nominal model needs, in at most `SAMPLES` of the rows [N m or N]."""
+    rows = np.concatenate(parts, axis=1) if parts else np.zeros((4, 0, robot.n))
+    if rows.shape[1] == 0:
+        return np.zeros(1)
+    q, qd, qdd, tau = rows[:, np.linspace(0, rows.shape[1] - 1, SAMPLES).astype(int)]
+    return (tau - nominal_torques(robot, q, qd, qdd).total)[:, j]
 
 
 def _runs(there: np.ndarray) -> np.ndarray:
