@@ -299,6 +299,17 @@ def test_a_member_that_moves_nothing_is_removed_though_the_set_without_it_was_ju
     assert search.run((1, 2)) == (2,)
 
 
+def test_an_effect_of_the_whole_arm_is_judged_though_others_look_better_before_the_noise_is_fitted_anew(monkeypatch):
+    space, _ = planted(0, {2: 5.0})
+    slugs = ("gravity_tilt", "payload", "external_wrench", "contact")
+    whole = [dataclasses.replace(c, effect=CATALOGUE[s], joints=(0, 1))
+             for c, s in zip(space.candidates, slugs, strict=False)]  # fmt: skip
+    space = dataclasses.replace(space, candidates=(*whole, *space.candidates[len(whole) :]))
+    search = Search(space, (SETTING, SETTING))
+    monkeypatch.setattr(search, "_scored", lambda _, joint: [(0.0, i) for i in (0, 1, 3, 2)] if joint == 2 else [])
+    assert 2 in search.run((4,))
+
+
 def test_what_a_search_holds_is_in_every_set_it_returns():
     """Two laws that are not there, one of which is held; what is there is found beside it."""
     space, _ = planted(5, {2: 2.0})

@@ -107,13 +107,15 @@ class Search:
             chosen = other
         return chosen
 
-    def screened(self, chosen: frozenset[int], joint: int, most: int = BEST, least: float = -np.inf) -> list[int]:
+    def screened(
+        self, chosen: frozenset[int], joint: int, most: int | None = BEST, least: float = -np.inf
+    ) -> list[int]:
         """The most promising candidates at a joint beside a set, the best of each kind and site.
 
         Args:
             chosen: The set.
             joint: Its number; the one after the last joint's stands for effects of the whole arm.
-            most: How many.
+            most: How many; all where None.
             least: Log posterior that they must be able to reach with sizes fitted anew.
         """
         bad, within = self.space.conflicts(tuple(chosen)), least - self._refitting
@@ -160,7 +162,9 @@ class Search:
         return {j for m in members for j in self.space.candidates[m].joints}
 
     def _added(self, now: frozenset[int]) -> frozenset[int]:
-        tries = {i for j in range(len(self._sites)) for i in self.screened(now, j, 2, self._value(now))}
+        # What acts on the whole arm may change the noise of some joints only, which no trial of all of them shows.
+        most = [*(2 for _ in self.space.joints), None]
+        tries = {i for j, few in enumerate(most) for i in self.screened(now, j, few, self._value(now))}
         return self._best(now, ((now | {i}, self._joints(i)) for i in tries))
 
     def _removed(self, now: frozenset[int]) -> frozenset[int]:
