@@ -41,8 +41,11 @@ sys.path.insert(0, str(ROOT))  # testbed/ stands beside experiments/ and is inst
 from testbed import scoring  # noqa: E402
 
 CUT = {"staubli_tx40": 40.0, "dfki_double_pendulum": 20.0, "bam_xl330": 15.0}  # Hz, of the positions
+STORED = "hidden_in_real_recordings.jsonl"
+POWERED = 0.25  # of the torque of the recording in which a joint logs most
 EVERY = 100.0  # Hz, at which MuJoCo is asked
-KEPT = ("verdict", "findings", "unexplained", "not_testable", "fit", "notes", "summary")
+KEPT = {"findings": ("effect", "joints", "parameters", "evidence", "alternatives"), "unexplained": ("joints", "where"),
+        "not_testable": ("effect", "joints")}  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,6 +115,12 @@ def machines(config: Config, folder: pathlib.Path) -> Iterator[tuple[str, pathli
     if "bam_xl330" in config.machines:
         files = [write_servo(folder / "servo", name) for name, (kp, _) in servo_runs().items() if kp != JUDGED]
         yield "bam_xl330", files[0][0], [path for _, path in files]
+
+
+def driven(recordings: list[Recording]) -> list[Recording]:
+    """Those in which every joint is driven: one that swings unpowered logs no torque, whatever more it would need."""
+    sizes = np.array([np.std(r.tau, axis=0) for r in recordings])
+    return [r for r, size in zip(recordings, sizes, strict=True) if np.all(size > POWERED * sizes.max(axis=0))]
 
 
 def motion_of(model: mujoco.MjModel, log: Recording, number: int, cut: float) -> Motion:
@@ -338,7 +347,7 @@ def run(config: Config) -> None:
         folder = pathlib.Path(name)
         for machine, file, logs in machines(config, folder):
             robot, model = load_robot(file), mujoco.MjModel.from_xml_path(str(file))
-            recordings = [read_recording(p, robot) for p in logs]
+            recordings = driven([read_recording(p, robot) for p in logs])
             motions = [motion_of(model, r, i, CUT[machine]) for i, r in enumerate(recordings)]
             bare = diagnosed(robot, recordings, folder)
             keep(config, {"machine": machine, "hidden": "nothing"} | bare)
@@ -366,12 +375,13 @@ def diagnosed(robot: Any, recordings: list[Recording], folder: pathlib.Path) -> 
     files = [write_recording(r, folder / f"{i}.npz") for i, r in enumerate(recordings)]
     began = time.perf_counter()
     result = diagnose(robot, [read_recording(p, robot) for p in files]).diagnosis.to_json()
-    return {"seconds": round(time.perf_counter() - began, 1), "diagnosis": {k: result[k] for k in KEPT}}
+    kept = {part: [{k: x[k] for k in keys} for x in result[part]] for part, keys in KEPT.items()}
+    return {"seconds": round(time.perf_counter() - began, 1), "diagnosis": kept}
 
 
 def keep(config: Config, line: dict[str, Any]) -> None:
     """Store a result in the place of its former one."""
-    path = config.out / "hidden_in_real_recordings.jsonl"
+    path = config.out / STORED
     same = lambda x: (x["machine"], x["hidden"], x.get("share"))  # noqa: E731
     rest = [x for x in stored(config) if same(x) != same(line)]
     line["engine"] = study_provenance.commit()
@@ -381,7 +391,7 @@ def keep(config: Config, line: dict[str, Any]) -> None:
 
 def stored(config: Config) -> list[dict[str, Any]]:
     """All that is stored."""
-    path = config.out / "hidden_in_real_recordings.jsonl"
+    path = config.out / STORED
     return [json.loads(x) for x in path.read_text(encoding="utf-8").splitlines()] if path.is_file() else []
 
 
@@ -421,17 +431,20 @@ def row(line: dict[str, Any], bare: dict[str, Any]) -> str:
     """A line of the table."""
     j = judged(line, bare)
     name = lambda k: f"{k[0]} on {', '.join(k[1]) if len(k[1]) < 3 else 'all'}"  # noqa: E731
-    values = "; ".join(f"{k} {s:.3g} ± {std:.2g} (true {true:.3g})" for k, (true, s, std) in j["value"].items())
+    values = "; ".join(f"{k} {s:.3g} ± {std:.2g} ({true:.3g})" for k, (true, s, std) in j["value"].items())
     where = ", ".join(line["truth"]["joints"]) if len(line["truth"]["joints"]) < 3 else "all joints"
-    return (f"| `{line['machine']}` | {line['hidden']} on {where} | {j['how']} | {values or '—'} | "
-            f"{'; '.join(map(name, j['more'])) or 'none'} | {'; '.join(map(name, j['lost'])) or 'none'} |")  # fmt: skip
+    more, lost = ("; ".join(map(name, j[k])) or "none" for k in ("more", "lost"))
+    cells = (f"`{line['machine']}`", f"{100 * line['share']:.0f} %", f"{line['hidden']} on {where}", j["how"],
+             values or "—", more, lost)  # fmt: skip
+    return f"| {' | '.join(cells)} |"
 
 
 def table(config: Config) -> str:
     """What is stored, as a table."""
     lines = stored(config)
     bare = {x["machine"]: x for x in lines if x["hidden"] == "nothing"}
-    head = ["| machine | hidden | it is | parameters | named beside it | no longer named |", "|" + "---|" * 6]
+    head = ["| machine | share | hidden | it is | parameters (true) | named beside it | no longer named |",
+            "|" + "---|" * 7]  # fmt: skip
     return "\n".join([*head, *(row(x, bare[x["machine"]]) for x in lines if x["hidden"] != "nothing")])
 
 
