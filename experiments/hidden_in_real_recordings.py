@@ -230,10 +230,10 @@ def rotor(motions, j, torque, rng):
 
 
 def dry(motions, j, torque, rng):
-    """More dry friction, rounded over half a per cent of the speed."""
+    """More dry friction, rounded over half a per cent of the speed; friction that grows with load has a level, too."""
     slow = 0.005 * rms(over(motions, lambda m: m.qd[:, j]))
     return Hidden(law(j, lambda m: torque * m.qd[:, j] / np.hypot(m.qd[:, j], slow)), "coulomb_friction", (j,),
-                  {"coulomb": torque}, ("coulomb_friction",))  # fmt: skip
+                  {"coulomb": torque}, ("coulomb_friction", "load_dependent_friction"))  # fmt: skip
 
 
 def viscous(motions, j, torque, rng):

@@ -19,6 +19,8 @@ ROOT = pathlib.Path(__file__).parents[1]
 LOOKS = ("first", "second", "third", "", "fifth", "sixth", "seventh")  # labels of the looks at *check*
 # Labels of *check* under other conditions, as `testbed.runner` makes them.
 CONDITIONS = {"quiet": "noise and steps of the sensors / 10", "long": "recordings 10 times as long"}
+# Labels of *work* with inertials that are wrong by another share than the drawn one.
+ERRORS = {f"error_{share}": f"{100 * share:g} %" for share in (0.02, 0.1, 0.2, 0.3)}
 # Forms of cases of servos in closed loop: what is logged, or known of their gains.
 SERVOS = {"torque": "torque", "known": "commands; gains known", "wrong": "commands; gains about 10 % wrong",
           "unknown": "commands; gains unknown",
@@ -110,7 +112,7 @@ def coverage(lines: Lines) -> Rows:
 
 
 def in_rows(what: str, runs: dict[str, Lines]) -> str:
-    """Runs over *check* in a row each: the engine, and what came out."""
+    """Runs over a draw in a row each: the engine, and what came out."""
     rows = []
     for name, every in runs.items():
         lines = [x for x in every if x["diagnosis"]]
@@ -239,6 +241,8 @@ def main() -> None:
     looks = [look for look in (runner.read(runner.stored("check", label)) for label in LOOKS) if look]
     conditions = {said: runner.read(runner.stored("check", label)) for label, said in CONDITIONS.items()}
     conditions = {said: every for said, every in conditions.items() if any(x["diagnosis"] for x in every)}
+    errors = {said: runner.read(runner.stored("work", label)) for label, said in ERRORS.items()}
+    errors = {said: every for said, every in errors.items() if any(x["diagnosis"] for x in every)}
     servos = {said: runner.read(runner.stored("check", f"servo_{form}")) for form, said in SERVOS.items()}
     servos = {said: every for said, every in servos.items() if any(x["diagnosis"] for x in every)}
     draws = {"final": runner.read(runner.stored("final")), "check": looks[-1]}
@@ -255,6 +259,7 @@ def main() -> None:
         mixture=", ".join(f"{n} {name}" if n > 1 else name for name, n in many.items()),
         looks=in_rows("look at *check*", {str(number): every for number, every in enumerate(looks, 1)}),
         conditions=in_rows("cases of *check* with", conditions) if conditions else "",
+        errors=in_rows("true error of the inertials", errors) if errors else "",
         servos=in_closed_loop(servos) if servos else "",
         draws=[section(name, every, runner.read(runner.stored(name, "first"))) for name, every in draws.items()],
         probes=markdown(head, [probe_row(x) for x in probes]) if probes else "", probes_engine=engines(probes),
