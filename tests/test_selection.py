@@ -310,6 +310,22 @@ def test_an_effect_of_the_whole_arm_is_judged_though_others_look_better_before_t
     assert 2 in search.run((4,))
 
 
+def test_an_effect_of_the_whole_arm_is_added_with_another_where_neither_is_worth_it_alone(monkeypatch):
+    """A push beside which a rotor drowns: 2 is the push, 3 and 7 are rotors."""
+    space, _ = planted(0, {})
+    search = Search(space, (SETTING, SETTING))
+    worth = {frozenset({4}): 0.0, frozenset({4, 2, 3}): 5.0}
+
+    def judged(chosen, hyper, joints=None):
+        search.visited.setdefault(frozenset(chosen), (worth.get(frozenset(chosen), -1.0), hyper))
+        return search.visited[frozenset(chosen)][0]
+
+    monkeypatch.setattr(search, "judged", judged)
+    monkeypatch.setattr(search, "_scored", lambda _, joint: [(0.0, [3, 7, 2][joint])])
+    judged((4,), search.start)
+    assert search._added(frozenset({4})) == {4, 2, 3}
+
+
 def test_what_a_search_holds_is_in_every_set_it_returns():
     """Two laws that are not there, one of which is held; what is there is found beside it."""
     space, _ = planted(5, {2: 2.0})
