@@ -17,7 +17,7 @@ PUBLISHED = {
     "the same, within what the torque says of it": 0.0325,
 }  # fmt: skip  # rad
 PUBLISHED_BY_POSITION = 0.0325  # rad, of the same runs, with the duty cycle and numbers fitted to positions
-WAYS = ("named", "in the class", "unexplained", "not testable", "missed")  # of `testbed.scoring.stated_classes`
+WAYS = ("named", "in the class", hidden.BEFORE, "unexplained", "not testable", "missed")
 COVERAGE = 1.645  # half-width of a 90 % interval in standard deviations
 MODELS = ("nominal", "refit", "corrected")
 FLEW = "flies away | | | |"
@@ -184,15 +184,19 @@ def concealed(config: Config) -> list[str]:
         "## Physics concealed in recordings of real machines", "",
         "The machine is real; what is known is only what was added to its log: the torque that one more effect",
         "would have needed along the same motion, or a fault of the log",
-        "(`experiments/hidden_in_real_recordings.py`). The laws are not of the library's form, joints are drawn",
-        "at random, and the size is a share of the joint's torque, root mean square. A wrong torque constant is",
-        "off by three times that; a delay is 10 ms, a zero is off by 0.05 rad, and a base leans by as much,",
-        "whatever the share. What a machine has itself of friction, rotors and offsets is taken off the",
-        "parameters where its own log named it. Of the pendulum only runs in which both joints are driven are",
-        "used.",
+        "(`experiments/hidden_in_real_recordings.py`). Frictions, springs, ripples, payloads and pushes are of",
+        "another form than the library's. Joints are drawn at random, and the size is a share of the joint's",
+        "torque, root mean square. A wrong torque constant is off by three times that; a delay is 10 ms, a zero",
+        "is off by 0.05 rad, and a base leans by as much, whatever the share. What a machine has itself of",
+        "friction, rotors and offsets is taken off the parameters where its own log named it. Where that log has",
+        "the name already, it proves nothing and is counted apart: there the parameters tell. Of each machine",
+        "only recordings in which every joint is driven are used: at an unpowered one, added torque is no",
+        "physics.",
         "",
-        "| machine | share | hidden | named | in the class | unexplained | not testable | missed | names beside it |",
-        "|---|---|---|---|---|---|---|---|---|",
+        f"Engine at commit {', '.join(sorted({x['engine'] for x in lines}))}.", "",
+        "| machine | share | hidden | named | in the class | named before, too | unexplained | not testable | missed "
+        "| names beside it |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     for machine in bare:
         for share in sorted({x["share"] for x, _ in ran if x["machine"] == machine}):

@@ -24,7 +24,7 @@ from irb140_jax.recordings.machines.bam_xl330 import servo_runs, write_servo
 from irb140_jax.recordings.machines.cycloidal_play import write_cycloidal
 from irb140_jax.recordings.machines.dfki_double_pendulum import write_pendulum
 from irb140_jax.recordings.machines.staubli_tx40 import write_tx40
-from irb140_jax.robot import Robot, load_robot
+from irb140_jax.robot import load_robot
 
 LATE = 1.0  # s
 
@@ -36,20 +36,17 @@ class Config:
     out: pathlib.Path = pathlib.Path("results")
 
 
-def machines(folder: pathlib.Path) -> Iterator[tuple[str, Robot, list[Recording]]]:
-    """Every machine with torque: name, model as given, and the recordings that its own experiment fits."""
+def machines(folder: pathlib.Path) -> Iterator[tuple[str, pathlib.Path, list[pathlib.Path]]]:
+    """Every machine with torque: name, model as given, and the recordings that its own experiment fits, as files."""
     model, (train, _) = write_tx40(folder / "tx40")
-    robot = load_robot(model)
-    yield "staubli_tx40", robot, [read_recording(train, robot)]
+    yield "staubli_tx40", model, [train]
     models, runs = write_pendulum(folder / "pendulum", "C.1")
-    robot, test = load_robot(models["correct"]), real_double_pendulum.TEST["C.1"]
-    yield "dfki_double_pendulum", robot, [read_recording(p, robot) for n, p in runs.items() if not n.endswith(test)]
+    test = real_double_pendulum.TEST["C.1"]
+    yield "dfki_double_pendulum", models["correct"], [p for n, p in runs.items() if not n.endswith(test)]
     files = [write_servo(folder / "servo", name) for name, (kp, _) in servo_runs().items() if kp != JUDGED]
-    robot = load_robot(files[0][0])
-    yield "bam_xl330", robot, [read_recording(path, robot) for _, path in files]
+    yield "bam_xl330", files[0][0], [path for _, path in files]
     model, path = write_cycloidal(folder / "gear", "base_onyx runin1")
-    robot = load_robot(model)
-    yield "cycloidal_play", robot, [read_recording(path, robot)]
+    yield "cycloidal_play", model, [path]
 
 
 def rows(r: Recording, keep: np.ndarray, name: str) -> Recording:
@@ -79,7 +76,9 @@ def main() -> None:
     kept = config.out / "real_machines_varied.json"
     results: dict[str, dict[str, list[str]]] = {}
     with tempfile.TemporaryDirectory() as folder:
-        for machine, robot, recordings in machines(pathlib.Path(folder)):
+        for machine, model, files in machines(pathlib.Path(folder)):
+            robot = load_robot(model)
+            recordings = [read_recording(path, robot) for path in files]
             for name, vary in VARIATIONS.items():
                 varied = []
                 for i, part in enumerate(part for r in recordings for part in vary(r)):

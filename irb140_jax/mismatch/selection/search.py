@@ -162,17 +162,17 @@ class Search:
         return {j for m in members for j in self.space.candidates[m].joints}
 
     def _added(self, now: frozenset[int]) -> frozenset[int]:
-        """One more, or an effect of the whole arm with another that shows beside it."""
-        # What acts on the whole arm may change the noise of some joints only, which no trial of all of them shows.
+        """One more; where none is worth it, the best effect of the whole arm with another that shows beside it."""
+        # What acts on the whole arm may lower the noise of some joints only, which no trial of all of them shows.
         least, whole = self._value(now), self.screened(now, len(self.space.joints), None, self._value(now))
         tries = {i for j in range(len(self.space.joints)) for i in self.screened(now, j, 2, least)}
         better = self._best(now, ((now | {i}, self._joints(i)) for i in sorted({*tries, *whole})))
         if better != now or not whole:
             return better
         # Beside a push that is not named all else drowns, and with it the reason to name the push.
-        best = max(whole, key=lambda i: self._value(now | {i}) if now | {i} in self.visited else -np.inf)
+        best = max(whole, key=lambda i: self._value(now | {i}))
         one = now | {best}
-        if one not in self.visited or not np.isfinite(self._value(one)):
+        if not np.isfinite(self._value(one)):
             return now
         more = {i for j in range(len(self.space.joints)) for i in self.screened(one, j, 1, least)}
         return self._best(now, ((one | {i}, self._joints(best, i)) for i in more))

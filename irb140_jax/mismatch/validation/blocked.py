@@ -61,10 +61,11 @@ def blocked(robot: Robot, recordings: Sequence[Conditioned]) -> list[Blocked]:
                     if len(rows) * (r.t[1] - r.t[0]) > settings.EVENT_MARGIN:
                         times.append((i, float(r.t[first]), float(r.t[last - 1])))
                         held.append(_at(r, rows))
-            beyond = way * _beyond(robot, held, j)
+            if not times:
+                continue
+            beyond, before = (way * _beyond(robot, rows, j) for rows in (held, beside))
             # A spring, or a model that is wrong there, pushes back nearly as much just before the end.
-            sudden = np.median(beyond) > 2.0 * np.median(way * _beyond(robot, beside, j))
-            if times and sudden and np.median(beyond) > much:
+            if np.median(beyond) > max(much, 2.0 * np.median(before)):
                 out.append(Blocked(j, end, tuple(times), float(beyond.max()), much / settings.ABOVE_NOISE))
     return out
 
@@ -75,8 +76,8 @@ def _at(r: Conditioned, rows: np.ndarray) -> np.ndarray:
 
 
 def _beyond(robot: Robot, parts: Sequence[np.ndarray], j: int) -> np.ndarray:
-    """Torque of one joint beyond what the nominal model needs, in at most `SAMPLES` of the rows [N m or N]."""
-    rows = np.concatenate(parts, axis=1) if parts else np.zeros((4, 0, robot.n))
+    """Torque of one joint beyond what the nominal model needs, at `SAMPLES` of the rows, 0 without rows [N m or N]."""
+    rows = np.concatenate(parts, axis=1)
     if rows.shape[1] == 0:
         return np.zeros(1)
     q, qd, qdd, tau = rows[:, np.linspace(0, rows.shape[1] - 1, SAMPLES).astype(int)]
