@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from testbed import leaving_out, rubbing
+from testbed import leaving_out, outside, rubbing
 from testbed.arms import built, irb140, random_arm
 from testbed.loggers import Logger, logged, random_logger
 from testbed.motions import PROGRAMMES, Motion, programme
@@ -38,12 +38,13 @@ OTHER: dict[str, Kind] = {
     "current_loop": leaving_out.current_loop, "geometry": leaving_out.geometry, "dead": leaving_out.dead,
     "slow_filter": leaving_out.slow_filter,
 }  # fmt: skip
-KINDS = NAMED | OTHER
+KINDS = NAMED | OTHER | outside.KINDS
 # Whole-machine frictions: the same odd law at every joint, as machines have it.
 EVERY_JOINT = ("lugre", "maxwell_slip", "stiff_dahl", "by_the_day", "gear_mesh")
-SCALES = ("torque constant", "saturating motor")
+SCALES = ("torque constant", "saturating motor", "sagging motor", "warm magnets")
 # One pass of the mixture; a draw shuffles each pass, so that any stretch of indices holds about these shares.
 PASS = (*NAMED, *OTHER, "lugre", "stiff_dahl", "by_the_day", "all_constants", *("ordinary",) * 6, *("nothing",) * 5)
+OUTSIDE = tuple(outside.KINDS)
 ERRORS = (0.05,) * 8 + (0.02, 0.1, 0.2, 0.3)  # true relative errors of inertials; the stated one is always 5 %
 STATED = 0.05
 SECONDS = (12.0, 20.0)
@@ -79,12 +80,12 @@ class Case:
     prescribed: bool = True
 
 
-def kinds_of(draw: str, index: int, commit: str = "") -> tuple[str, ...]:
-    """What a case hides: one kind of a shuffled pass of the mixture, and one more in every sixth case."""
-    order = generator(draw, index // len(PASS), "pass", commit).permutation(len(PASS))
-    first = PASS[order[index % len(PASS)]]
+def kinds_of(draw: str, index: int, commit: str = "", mixture: tuple[str, ...] = PASS) -> tuple[str, ...]:
+    """What a case hides: one kind of a shuffled pass of the mixture, and in `PASS` one more in every sixth case."""
+    order = generator(draw, index // len(mixture), "pass", commit).permutation(len(mixture))
+    first = mixture[order[index % len(mixture)]]
     rng = generator(draw, index, "second", commit)
-    if first in ("ordinary", "nothing") or rng.random() > 1.0 / 6.0:
+    if mixture is not PASS or first in ("ordinary", "nothing") or rng.random() > 1.0 / 6.0:
         return (first,)
     second = str(rng.choice([k for k in NAMED if k != first]))
     two_masses = {"joint_elasticity", "backlash"}  # a plant has room for one flexible joint
@@ -106,7 +107,9 @@ class Variation:
     error: float | None = None
 
 
-def make(draw: str, index: int, commit: str = "", vary: Variation = Variation()) -> Case:  # noqa: B008
+def make(
+    draw: str, index: int, commit: str = "", vary: Variation = Variation(), mixture: tuple[str, ...] = PASS  # noqa: B008
+) -> Case:
     """A case: a pure function of its draw and its index.
 
     Args:
@@ -114,9 +117,10 @@ def make(draw: str, index: int, commit: str = "", vary: Variation = Variation())
         index: 0, 1, 2, ...
         commit: Seeds "final".
         vary: Conditions other than those drawn.
+        mixture: What may be hidden: `PASS`, or `OUTSIDE` for what neither it nor the library has.
     """
     rng, moving, logging = (generator(draw, index, stream, commit) for stream in ("plant", "motions", "logger"))
-    kinds = kinds_of(draw, index, commit)
+    kinds = kinds_of(draw, index, commit, mixture)
     nominal = irb140() if rng.random() < 0.4 else random_arm(rng, int(rng.integers(2, 8)))
     drawn, name = float(rng.choice(ERRORS)), str(rng.choice(list(PROGRAMMES), p=(0.2, 0.5, 0.15, 0.15)))
     error = drawn if vary.error is None else vary.error

@@ -52,7 +52,8 @@ def hardening_spring(plant, sizes, rng, j, torque):
     rest = 0.5 * (sizes.low[j] + sizes.high[j]) + rng.uniform(-0.5, 0.5) * spread
     slope, cubic = 0.3 * torque / spread, 2.0 * torque / spread**3
     plant.laws.append(on(j, lambda m, load: surroundings.hardening(m.q[:, j], rest, slope, cubic)))
-    hide(plant, "hardening spring", None, j, {}, accept=("gravity_spring",), tolerate=("torque_offset",), unnamed=True)
+    hide(plant, "hardening spring", None, j, {}, accept=("gravity_spring",), tolerate=("torque_offset",), unnamed=True,
+         depends=("position",))  # fmt: skip
 
 
 def tilt(plant, sizes, rng, j, torque):
@@ -225,7 +226,8 @@ def current_loop(plant, sizes, rng, j, torque):
         return tau
 
     plant.drives.append(drive)
-    hide(plant, "saturating motor", None, j, {}, accept=("torque_ripple", "torque_gain"), unnamed=True)
+    hide(plant, "saturating motor", None, j, {}, accept=("torque_ripple", "torque_gain"), unnamed=True,
+         depends=("load", "position"))  # fmt: skip
 
 
 def geometry(plant, sizes, rng, j, torque):

@@ -27,6 +27,7 @@ class Hidden:
         tolerate: Names that are not wrong beside it.
         role: "special"; "ordinary" friction; or "instrument", which may but need not be named.
         unnamed: Whether saying that something is left, or a note, is right, too.
+        depends: Words, one of which a sentence on what is left there has to say of what it depends on.
     """
 
     kind: str
@@ -37,6 +38,7 @@ class Hidden:
     tolerate: tuple[str, ...] = ()
     role: str = "special"
     unnamed: bool = False
+    depends: tuple[str, ...] = ()
 
 
 @dataclasses.dataclass
@@ -50,6 +52,7 @@ class Plant:
         transmission: The one joint that is flexible or has play, if any.
         drives: From the torque on the joints to the one asked for, one after the other.
         zero: Added to the logged positions, shape (n,) [rad or m].
+        misread: Joints whose position is read wrongly: joint -> error at a true position [rad or m].
         late: By how much each torque channel lags behind the positions, shape (n,) [s].
         dead: Channels that show something else: joint -> function of time and torque, (T,) each.
         hidden: The truth.
@@ -62,6 +65,7 @@ class Plant:
     transmission: flexible.Transmission | None = None
     drives: list[Drive] = dataclasses.field(default_factory=list)
     zero: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    misread: dict[int, Callable[[np.ndarray], np.ndarray]] = dataclasses.field(default_factory=dict)
     late: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     dead: dict[int, Callable[[np.ndarray, np.ndarray], np.ndarray]] = dataclasses.field(default_factory=dict)
     hidden: list[Hidden] = dataclasses.field(default_factory=list)
@@ -124,7 +128,15 @@ def channels(plant: Plant, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     tau = drives.late(motion.t, torque(plant, motion), plant.late)
     for j, shown in plant.dead.items():
         tau[:, j] = shown(motion.t, tau[:, j])
-    return motion.q + plant.zero, tau
+    return as_read(plant, motion.q), tau
+
+
+def as_read(plant: Plant, q: np.ndarray) -> np.ndarray:
+    """Positions as the encoders show them, (T, n), at true ones."""
+    shown = q + plant.zero
+    for j, error in plant.misread.items():
+        shown[:, j] += error(q[:, j])
+    return shown
 
 
 def torque_along(
@@ -140,7 +152,7 @@ def torque_along(
     """
     fine = np.arange(t[0], t[-1], STEP)
     at = lambda x: interpolate.CubicSpline(t, x)(fine)  # noqa: E731
-    tau = channels(plant, Motion(fine, at(q - plant.zero), at(qd), at(qdd), number))[1]
+    tau = channels(plant, Motion(fine, at(2.0 * q - as_read(plant, q)), at(qd), at(qdd), number))[1]
     return np.stack([np.interp(t, fine, c) for c in tau.T], axis=1)
 
 

@@ -27,6 +27,7 @@ SERVOS = {"torque": "torque", "known": "commands; gains known", "wrong": "comman
           "laws": "commands; gains known, a law of the servo hidden"}  # fmt: skip
 LEVELS = (0.5, 0.9, 0.99)
 WAYS = ("named", "in the class", "not testable", "unexplained", "missed")
+WORDS = ("rightly", "otherwise")
 PLACES = ("located", "named alike", "noted", "not said")
 Lines = list[dict[str, Any]]
 Rows = list[tuple[str, ...]]
@@ -148,6 +149,24 @@ def in_closed_loop(forms: dict[str, Lines]) -> str:
                      "90 % intervals that hold", "error on unseen torque over refit's, median"), rows)  # fmt: skip
 
 
+def outside(draws: dict[str, Lines]) -> str:
+    """Cases of physics that neither the library nor the usual mixture has, a row for each draw."""
+    rows = []
+    for draw, every in draws.items():
+        lines = [x for x in every if x["diagnosis"]]
+        of = lambda fact, lines=lines: [x for line in lines for x in fact(line)]  # noqa: E731
+        rows.append((
+            draw, engines(every), f"{len(lines)} of {len(every)}",
+            f"{np.mean([len(scoring.false_names(x)) for x in lines]):.2f}",
+            counted([how != "not said" for _, how in of(scoring.located)]),
+            counted([right for _, right in of(scoring.places)]),
+            f"{np.median([scoring.unseen_ratio(x) for x in lines]):.2g}",
+        ))  # fmt: skip
+    return markdown(("draw", "engine at commit", "cases diagnosed", "false names a case",
+                     "located, named alike or noted", "of those located, what it depends on said rightly",
+                     "error on unseen torque over refit's, median"), rows)  # fmt: skip
+
+
 def tally(lines: Lines, of: Callable[[dict[str, Any]], list[tuple[str, str]]], ways: tuple[str, ...]) -> Rows:
     """How often each kind came out in which way."""
     by = collections.defaultdict(collections.Counter)
@@ -245,6 +264,10 @@ def main() -> None:
     errors = {said: every for said, every in errors.items() if any(x["diagnosis"] for x in every)}
     servos = {said: runner.read(runner.stored("check", f"servo_{form}")) for form, said in SERVOS.items()}
     servos = {said: every for said, every in servos.items() if any(x["diagnosis"] for x in every)}
+    beyond = {draw: runner.read(runner.stored(draw, "outside")) for draw in ("work", "check")}
+    beyond = {f"*{draw}*": every for draw, every in beyond.items() if any(x["diagnosis"] for x in every)}
+    last = [x for x in [*beyond.values()][-1] if x["diagnosis"]] if beyond else []
+    words = lambda line: [(kind, WORDS[not right]) for kind, right in scoring.places(line)]  # noqa: E731
     draws = {"final": runner.read(runner.stored("final")), "check": looks[-1]}
     draws = {name: every for name, every in draws.items() if any(x["diagnosis"] for x in every)}
     for name, every in draws.items():
@@ -260,7 +283,10 @@ def main() -> None:
         looks=in_rows("look at *check*", {str(number): every for number, every in enumerate(looks, 1)}),
         conditions=in_rows("cases of *check* with", conditions) if conditions else "",
         errors=in_rows("true error of the inertials", errors) if errors else "",
-        servos=in_closed_loop(servos) if servos else "",
+        servos=in_closed_loop(servos) if servos else "", outside=outside(beyond) if beyond else "",
+        outside_places=markdown(("hidden", "times", *PLACES), tally(last, scoring.located, PLACES)),
+        outside_words=markdown(("located", "times", *WORDS), tally(last, words, WORDS)),
+        outside_false=markdown(("case", "hidden", "said", "probability"), false_rows(last)),
         draws=[section(name, every, runner.read(runner.stored(name, "first"))) for name, every in draws.items()],
         probes=markdown(head, [probe_row(x) for x in probes]) if probes else "", probes_engine=engines(probes),
         narrower=narrower(probes),

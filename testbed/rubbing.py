@@ -141,7 +141,7 @@ def gear_mesh(plant, sizes, rng, j, torque):
     plant.laws.append(on(j, lambda m, load: friction.dry(
         m.qd[:, j], torque * np.maximum(1.0 + depth * np.interp(m.q[:, j], x, y), 0.1), still)))  # fmt: skip
     hide(plant, "gear mesh", None, j, {}, accept=("position_dependent_friction", "torque_ripple"), unnamed=True,
-         tolerate=("coulomb_friction",), instead=("coulomb_friction",))  # fmt: skip
+         tolerate=("coulomb_friction",), instead=("coulomb_friction",), depends=("position",))  # fmt: skip
 
 
 def by_the_day(plant, sizes, rng, j, torque, factors=None):
@@ -156,11 +156,11 @@ def by_the_day(plant, sizes, rng, j, torque, factors=None):
 
 
 def hide(plant: Plant, kind: str, slug: str | None, j: int, parameters: dict[str, float], *, accept=(), tolerate=(),
-         role: str = "special", unnamed: bool = False, instead=()) -> None:  # fmt: skip
+         role: str = "special", unnamed: bool = False, instead=(), depends=()) -> None:  # fmt: skip
     """Write down the truth, and which ordinary friction it stands for."""
     accept = ((slug,) if slug else ()) + tuple(accept)
     values = {name: float(value) for name, value in parameters.items()}
-    plant.hidden.append(Hidden(kind, slug, (j,), values, accept, tuple(tolerate), role, unnamed))
+    plant.hidden.append(Hidden(kind, slug, (j,), values, accept, tuple(tolerate), role, unnamed, tuple(depends)))
     for other in (*instead, *((slug,) if slug in ORDINARY else ())):
         plant.taken.setdefault(other, set()).add(j)
 

@@ -4,6 +4,7 @@
     python -m testbed.runner check --count 300          # ... of *check*: every run of it is a look that counts
     python -m testbed.runner final --commit HASH
     python -m testbed.runner work --servo known         # servos in closed loop, of which gains are known
+    python -m testbed.runner work --outside             # physics that neither the library nor the usual mixture has
     python -m testbed.runner work --label new --call irb140_jax.another:diagnose
 
 One JSON line a case is appended to results/testbed_DRAW.jsonl as it is done, so an interrupted run goes on where it
@@ -26,7 +27,7 @@ import numpy as np
 import tyro
 from scipy import signal
 
-from testbed.cases import Case, Variation, make
+from testbed.cases import OUTSIDE, PASS, Case, Variation, make
 from testbed.plants import torque_along
 from testbed.servos import Form, make_servo
 
@@ -48,6 +49,8 @@ class Config:
     noise: float = 1.0
     longer: float = 1.0
     error: float | None = None
+    outside: bool = False
+    """Physics that neither the library nor the usual mixture has."""
     servo: Form | None = None
     """A case of servos in closed loop: what is logged, or known of its gains."""
     call: str = "irb140_jax.mismatch:diagnose"
@@ -202,7 +205,8 @@ def main() -> None:
     config.out.mkdir(parents=True, exist_ok=True)
     module, _, function = config.call.partition(":")
     diagnose = getattr(importlib.import_module(module), function)
-    label = "_".join(x for x in (config.servo and f"servo_{config.servo}", config.label) if x)
+    parts = (config.servo and f"servo_{config.servo}", config.outside and "outside", config.label)
+    label = "_".join(x for x in parts if x)
     path = stored(config.draw, label, config.out)
     done = {r["index"] for r in read(path)}
     for index in range(config.count):
@@ -214,7 +218,7 @@ def main() -> None:
             case = make_servo(config.draw, index, config.servo, config.commit)
         else:
             vary = Variation(config.noise, config.longer, config.error)
-            case = make(config.draw, index, config.commit, vary)
+            case = make(config.draw, index, config.commit, vary, OUTSIDE if config.outside else PASS)
         out = {**judged(case, diagnose), "engine": config.engine}
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(compact(out)) + "\n")

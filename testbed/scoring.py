@@ -118,6 +118,15 @@ def located(line: dict[str, Any]) -> list[tuple[str, str]]:
     return out
 
 
+def places(line: dict[str, Any]) -> list[tuple[str, bool]]:
+    """Of each thing without a name that is located: its kind, and whether what it depends on is said rightly."""
+    return [
+        (h["kind"], any(word in u["where"].partition(" depends on ")[2] for word in h["depends"]))
+        for h in line["truth"]["hidden"] if h.get("depends")
+        for u in line["diagnosis"]["unexplained"] if set(u["joints"]) & set(h["joints"])
+    ]  # fmt: skip
+
+
 def unseen_ratio(line: dict[str, Any]) -> float:
     """Error of the corrected model over refit's on unseen motions, each joint weighed by its torque."""
     live = [j for j in line["truth"]["torque"] if j not in line["truth"]["dead"]]

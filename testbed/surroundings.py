@@ -29,6 +29,12 @@ def wall(x: np.ndarray, jacobian: np.ndarray, normal: np.ndarray, at: float, her
     return -np.einsum("t,i,tin->tn", force, normal, jacobian), depth, force
 
 
+def foam(x: np.ndarray, v: np.ndarray, low: float, high: float, depth: float) -> np.ndarray:
+    """Foam beyond `low` and `high`, pressed at speed v: (how deep / depth)^2, a third less on the way out, (T,)."""
+    into = np.minimum(x - low, 0.0) + np.maximum(x - high, 0.0)
+    return np.sign(into) * (into / depth) ** 2 * np.where(into * v > 0.0, 1.0, 2.0 / 3.0)
+
+
 def push(t: np.ndarray, jacobian: np.ndarray, force: np.ndarray, begin: float, end: float, rise: float) -> np.ndarray:
     """A force on the tool that grows over `rise` seconds about `begin` and fades about `end`, by raised cosines."""
     ramp = lambda at: 0.5 - 0.5 * np.cos(np.pi * np.clip((t - at) / rise + 0.5, 0.0, 1.0))  # noqa: E731

@@ -7,7 +7,7 @@ import pytest
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from testbed import cases, leaving_out, probes, rubbing, runner, seeds
+from testbed import cases, leaving_out, outside, probes, rubbing, runner, seeds
 from testbed.arms import built, irb140, random_arm
 from testbed.loggers import Logger, random_logger
 from testbed.motions import programme
@@ -30,7 +30,14 @@ def test_other_draws_and_other_commits_hide_other_things():
 
 def test_each_pass_of_the_mixture_holds_every_kind():
     first = [cases.kinds_of("check", i)[0] for i in range(len(cases.PASS))]
-    assert sorted(first) == sorted(cases.PASS) and set(cases.KINDS) <= set(first)
+    assert sorted(first) == sorted(cases.PASS) and {*cases.NAMED, *cases.OTHER} <= set(first)
+
+
+def test_what_lies_outside_is_drawn_alone_and_nowhere_else():
+    drawn = [cases.kinds_of("work", i, mixture=cases.OUTSIDE) for i in range(len(cases.OUTSIDE))]
+    assert sorted(drawn) == sorted((kind,) for kind in cases.OUTSIDE) and not {*cases.OUTSIDE} & {*cases.PASS}
+    case = cases.make("work", 0, mixture=cases.OUTSIDE)
+    assert case.hidden == drawn[0] and len([h for h in case.truth["hidden"] if h["role"] == "special"]) == 1
 
 
 @pytest.mark.parametrize(("draw", "commit"), [("final", ""), ("work", "abc"), ("other", "")])
@@ -115,7 +122,8 @@ def test_a_body_with_negative_mass_or_a_flat_inertia_is_impossible():
     assert not runner.possible(np.array([2.0, 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.5]))
 
 
-@pytest.mark.parametrize("hide", [leaving_out.push, rubbing.warming, leaving_out.zero, leaving_out.skew])
+@pytest.mark.parametrize("hide", [leaving_out.push, rubbing.warming, leaving_out.zero, leaving_out.skew,
+                                  outside.eccentric_encoder])
 def test_the_true_plant_leaves_the_torque_sensors_noise_where_positions_are_exact(hide, tmp_path):
     rng = np.random.default_rng(2)
     plant = Plant(irb140(), irb140())

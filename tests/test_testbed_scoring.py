@@ -68,6 +68,17 @@ def test_floors_errors_and_places_are_read_off():
 
 
 @pytest.mark.parametrize(
+    ("where", "right"),
+    [("a: 2 N m RMS that no effect explains; it depends on the torque of b", True),
+     ("a: 2 N m RMS that no effect explains; it depends on the joint's speed", False)],
+)  # fmt: skip
+def test_what_is_left_has_to_be_said_to_depend_on_what_it_depends_on(where, right):
+    odd = hidden(None, "a", unnamed=True)
+    got = line([], [odd | {"depends": ["of b"]}, odd], unexplained=[{"joints": ["a"], "where": where}])
+    assert scoring.places(got) == [("odd", right)]
+
+
+@pytest.mark.parametrize(
     ("truth", "verdict", "right"),
     [
         ([], "parameters_only", True),

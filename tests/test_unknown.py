@@ -5,8 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from irb140_jax.mismatch import diagnose, settings
+from irb140_jax.mismatch.regression.discrepancy import relaxed
+from irb140_jax.mismatch.regression.noise import Noise
+from irb140_jax.mismatch.validation import unexplained
 from irb140_jax.mismatch.validation.unexplained import Rows, competitors, predicted, shortest
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec
@@ -66,7 +70,7 @@ def test_viscous_friction_stays_beside_friction_that_grows_with_load_where_more_
 @pytest.mark.parametrize("louder", [1.0, 100.0])
 def test_what_one_recording_leaves_is_seen_to_go_with_time_however_much_louder_it_is(louder):
     rng, t = np.random.default_rng(0), 0.03 * np.arange(500)
-    one: Any = SimpleNamespace(t=t, **{k: rng.normal(size=(500, 1)) for k in ("q", "qd", "qdd", "nominal")})
+    one: Any = SimpleNamespace(t=t, **{k: rng.normal(size=(500, 1)) for k in ("q", "qd", "qdd", "nominal", "tau")})
     quiet, slow = rng.normal(size=500), np.sqrt(2.0) * np.sin(2.0 * np.pi * 0.3 * t)
     rows = Rows(
         [np.full(500, True)] * 2, np.append(quiet, slow), np.repeat([1.0, louder], 500), np.repeat([0, 1], 500)
@@ -92,14 +96,73 @@ def test_a_short_time_that_holds_most_of_what_is_left_is_told_and_a_long_one_is_
     assert when.of_torque == pytest.approx(30.0 / 50.0, rel=0.2)
 
 
-def test_what_the_teeth_of_a_gear_leave_goes_with_position_and_direction():
-    t = 0.02 * np.arange(1500)
-    q = np.sin(0.7 * t) + 0.5 * np.sin(1.1 * t + 1.0)
-    qd = 0.7 * np.cos(0.7 * t) + 0.55 * np.cos(1.1 * t + 1.0)
-    columns = {"q": q, "qd": qd, "qdd": np.gradient(qd, t), "nominal": np.cos(q)}
-    one: Any = SimpleNamespace(t=t, **{k: v[:, None] for k, v in columns.items()})
-    teeth = np.sign(qd) * np.sin(2.0 * np.pi * 9.0 * q)
-    rows = Rows([np.full(1500, True)], teeth, np.ones(1500), np.zeros(1500, int))
-    shares = {c.variable: predicted(c, rows.residual[:, None])[0] for c in competitors([one], 0, rows, ("hinge",))}
-    along = shares.pop("the joint's position and its direction of motion")
-    assert along > 0.8 and max(shares.values()) < 0.5
+T = 0.02 * np.arange(1500)
+
+
+def moving(slow, fast, phase):
+    """Position, speed and acceleration of a joint."""
+    q = np.sin(slow * T) + 0.5 * np.sin(fast * T + phase)
+    qd = slow * np.cos(slow * T) + 0.5 * fast * np.cos(fast * T + phase)
+    return q, qd, np.gradient(qd, T)
+
+
+def shares_of(law):
+    """Share that each competitor predicts of what `law` leaves at the first of two joints: words -> best."""
+    joints = [moving(0.7, 1.1, 1.0), moving(0.53, 1.37, 2.0)]
+    columns = {name: np.stack([x[k] for x in joints], axis=1) for k, name in enumerate(("q", "qd", "qdd"))}
+    columns["nominal"] = columns["tau"] = np.cos(columns["q"]) + 0.1 * columns["qdd"]
+    one: Any = SimpleNamespace(t=T, **columns)
+    rows = Rows([np.full(1500, True)], law(columns), np.ones(1500), np.zeros(1500, int))
+    out: dict[str, float] = {}
+    for c in competitors([one], 0, rows, ("hinge", "neighbour")):
+        out[c.variable] = max(predicted(c, rows.residual[:, None])[0], out.get(c.variable, -np.inf))
+    return out
+
+
+def hose(x):
+    """A spring that gives way within a second."""
+    return signal.lfilter([1.0, -1.0], [1.0, -np.exp(-0.02)], x["q"][:, 0])
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (lambda x: np.sign(x["qd"][:, 0]) * np.sin(18.0 * np.pi * x["q"][:, 0]),
+         "the joint's position and its direction of motion"),
+        (lambda x: np.exp(-((x["q"][:, 0] - 0.3) ** 2) / 0.01), "the joint's position"),
+        (lambda x: np.sign(x["qd"][:, 0]) * (1.0 + 0.9 * np.sin(3.0 * x["q"][:, 1])),
+         "the position of neighbour and the joint's own direction of motion"),
+        (lambda x: x["qd"][:, 0] * x["qd"][:, 1], "the motion of neighbour together with the joint's own"),
+        (lambda x: relaxed(x["q"][:, 0], 0.6), "the joint's own past"),
+        (hose, "the joint's own past"),
+    ],
+    ids=["teeth", "latch", "led cable", "gyroscope", "hysteresis", "hose"],
+)  # fmt: skip
+def test_what_is_left_is_said_to_depend_on_what_made_it(law, words):
+    shares = shares_of(law)
+    del shares["time more than on the motion"]  # whatever is slow goes with time as well
+    found = shares.pop(words)
+    assert found > 0.8 and max(shares.values()) < found
+
+
+def test_what_a_neighbours_torque_makes_in_loud_and_quiet_recordings_is_said_to_depend_on_it():
+    """A constant and a factor are the same in every recording, however much louder one is than another."""
+    q, qd, qdd = moving(0.7, 1.1, 1.0)
+    there = moving(0.53, 1.37, 2.0)
+    logs, left = [], []
+    for i, (share, torque) in enumerate(((1.0, 10.0 * there[2]), (0.1, 5.0 + q))):
+        pairs = {"q": (share * q, there[0]), "qd": (share * qd, there[1]), "qdd": (share * qdd, there[2]),
+                 "nominal": (np.cos(share * q), 0.0 * T), "tau": (np.cos(share * q), torque)}  # fmt: skip
+        columns = {k: np.stack(v, axis=1) for k, v in pairs.items()}
+        logs.append(SimpleNamespace(
+            recording=i, t=T, use=np.full((1500, 2), True), unsure=np.zeros((1500, 2)), **columns))  # fmt: skip
+        left.append(np.stack([torque, 0.0 * T], axis=1))
+    loud, quiet = np.full(2, 10.0), np.full(2, 0.2)
+    noise = Noise(np.eye(1, 11).repeat(2, axis=0), np.stack([loud, quiet]), np.stack([loud, quiet]), np.ones(2))
+    ex: Any = SimpleNamespace(noise=noise, data=SimpleNamespace(stretches=logs))
+    proof: Any = SimpleNamespace(left=left)
+    rows = unexplained._rows(ex, proof, 0)
+    rivals = unexplained.competitors(logs, 0, rows, ("hinge", "neighbour"))
+    shares = {c.variable: unexplained.predicted(c, rows.residual[:, None])[0] for c in rivals}
+    assert max(shares, key=lambda k: shares[k]) == "the torque of neighbour"
+    assert shares["the torque of neighbour"] > 0.95

@@ -124,7 +124,7 @@ def _reversal(r: Conditioned, carried: np.ndarray, scales: Scales, j: int, round
     q, qdd = r.q[:, j], r.qdd[:, j]
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
     direction = r.direction[:, j]
-    base = [_relaxed(q, share * travel) - direction for share in settings.BRISTLE_TRAVELS]
+    base = [relaxed(q, share * travel) - direction for share in settings.BRISTLE_TRAVELS]
     base += [np.interp(r.t - late, r.t, direction) - direction for late in settings.TURNING_DELAYS]
     base.append(through_rest(r.qd[:, j], qdd, r.t) - direction)
     alone = np.stack(base, axis=1)
@@ -144,7 +144,7 @@ def through_rest(qd: np.ndarray, qdd: np.ndarray, t: np.ndarray) -> np.ndarray:
     return np.divide(qd, reach, out=np.sign(qd), where=np.abs(qd) < reach)
 
 
-def _relaxed(q: np.ndarray, travel: float) -> np.ndarray:
+def relaxed(q: np.ndarray, travel: float) -> np.ndarray:
     """Direction that follows motion over some travel: Dahl's bristles of unit strength, shape (T,)."""
     dq = np.diff(q, prepend=q[0])
     keep, sign = np.exp(-np.abs(dq) / travel), np.sign(dq)

@@ -1,6 +1,6 @@
 """Structure that no effect of the library explains: flexible competitors, scored on data that they did not see.
 
-Each competitor knows one group of variables: the joint's position and speed, its load, its past, another joint, time.
+Each competitor knows few variables: of the joint's motion, load and past, of another joint, or time.
 If one of them predicts what the findings leave, something is left out, and its variables say where.  No finding is
 changed by it.
 """
@@ -12,6 +12,7 @@ import numpy as np
 from scipy import signal
 
 from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.regression.discrepancy import relaxed
 from irb140_jax.mismatch.regression.noise import spread
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
@@ -25,6 +26,8 @@ SEED = 20260
 SLOWEST, FASTEST = 0.3, 8.0  # Hz: oscillators that the competitor with a memory may hold
 OSCILLATORS = 12
 RINGING = 0.1  # their damping ratio
+TRAVELS = (0.01, 0.03, 0.1, 0.3)  # of the range: along which the same competitor's hysteresis settles
+SETTLING = (0.1, 0.3, 1.0, 3.0, 10.0)  # s: in which what the motion has strained gives way, for the same competitor
 MOTION_BLOCK = 2.5  # s left out together
 RIDGES = (0.003, 0.03, 0.3, 3.0, 30.0)  # of the features' variance; the best one counts, in the null as well
 TIME_BAND = 1.0  # Hz up to which the competitor of time follows
@@ -174,33 +177,44 @@ def competitors(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
     """
     weight = (np.median(rows.level) / rows.level)[:, None]
     rivals = _unweighted(stretches, j, rows, names)
-    return [c._replace(features=weight * c.features) if c.shifts else c for c in rivals]
+    # Each has a constant of its own: that of the residual is taken off, and may be another in its few variables.
+    weighted = [weight * np.hstack([c.features, np.ones_like(weight)]) for c in rivals]
+    return [c._replace(features=x) if c.shifts else c for c, x in zip(rivals, weighted, strict=True)]
 
 
 def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
-    q, qd, qdd, load = (
+    q, qd, qdd, load, tau = (
         np.stack([_standard(rows.of([getattr(s, name)[:, i] for s in stretches])) for i in range(len(names))], axis=1)
-        for name in ("q", "qd", "qdd", "nominal")
+        for name in ("q", "qd", "qdd", "nominal", "tau")
     )
+    direction = np.sign(rows.of([s.qd[:, [j]] for s in stretches]))
     mine = lambda x: x[:, [j]]  # noqa: E731
+    waves = _waves(mine(q))
     groups = {
-        "position": mine(q),
-        "speed": mine(qd),
-        "position and speed": np.hstack([mine(q), mine(qd)]),
-        "load and speed": np.hstack([mine(load), mine(qd)]),
-        "acceleration": mine(qdd),
+        "position": np.hstack([_features(mine(q)), waves]),
+        "speed": _features(mine(qd)),
+        "acceleration": _features(mine(qdd)),
+        "load": _features(mine(load)),
+        "position and speed": _features(np.hstack([mine(q), mine(qd)])),
+        "position and its direction of motion": np.hstack([waves, direction * waves, direction]),
+        "load and speed": _features(np.hstack([mine(load), mine(qd)])),
+        "own past": _memory(stretches, j, rows),
     }
-    fold = _motion_folds(stretches, rows)
-    out = [Competitor(f"the joint's {name}", _features(x), fold, True) for name, x in groups.items()]
-    along = _along_the_range(mine(q), np.sign(rows.of([s.qd[:, [j]] for s in stretches])))
-    out.append(Competitor("the joint's position and its direction of motion", along, fold, True))
-    out.append(Competitor("the joint's own past", _memory(stretches, j, rows), fold, True))
-    for i, name in enumerate(names):
-        if i != j:
-            pairs = [np.hstack([mine(x), x[:, [i]]]) for x in (q, qd)]
-            drive = np.hstack([qdd[:, [i]], load[:, [i]], mine(qd) * qd[:, [i]]])
-            features = np.hstack([*(_features(x) for x in pairs), drive])
-            out.append(Competitor(f"the motion of {name} together with the joint's own", features, fold, True))
+    fold, others = _motion_folds(stretches, rows), [i for i in range(len(names)) if i != j]
+    out = [Competitor(f"the joint's {name}", x, fold, True) for name, x in groups.items()]
+    # Not the joint's own logged torque: what is left is a part of it.
+    out += [Competitor(f"the torque of {names[i]}", _features(tau[:, [i]]), fold, True) for i in others]
+    out += [
+        Competitor(f"the position of {names[i]} and the joint's own direction of motion",
+                   np.hstack([direction * _features(q[:, [i]]), direction]), fold, True) for i in others
+    ]  # fmt: skip
+    own = np.hstack([np.ones_like(direction), direction, *(mine(x) for x in (q, qd, load))])
+    for i in others:
+        theirs = np.stack([q[:, i], qd[:, i], np.abs(qd[:, i]), np.sign(qd[:, i]), qdd[:, i]], axis=1)
+        few = (own[:, :, None] * theirs[:, None]).reshape(len(own), -1)
+        many = np.hstack([_features(np.hstack([mine(x), x[:, [i]]])) for x in (q, qd)])
+        together = f"the motion of {names[i]} together with the joint's own"
+        out += [Competitor(together, x, fold, True) for x in (few, many)]
     return [*out, _time(stretches, rows)]
 
 
@@ -216,8 +230,11 @@ def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
     recording = np.repeat(np.arange(len(pick)), [p.sum() for p in pick])
     y = np.concatenate([c[p, j] for c, p in zip(proof.left, pick, strict=True)]) / level
     if len(y):
-        limit = 6.0 * np.median(np.abs(y)) + 1e-12
-        y = np.clip(y - np.mean(y), -limit, limit)
+        # A constant of all recordings, in N m: they are not equally loud, and no structure.
+        y = y - (y @ (1.0 / level)) / np.sum(level**-2.0) / level
+        for r in np.unique(recording):
+            limit = 6.0 * np.median(np.abs(y[recording == r])) + 1e-12
+            y[recording == r] = np.clip(y[recording == r], -limit, limit)
     return Rows(pick, y, level, recording)
 
 
@@ -239,17 +256,20 @@ def _features(x: np.ndarray) -> np.ndarray:
     return np.concatenate([np.cos(x @ omega + phase), x, np.sign(x)], axis=1)
 
 
-def _along_the_range(q: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Waves of position, from the whole range down to teeth of a gear, the same in either direction or not, (R, F)."""
+def _waves(q: np.ndarray) -> np.ndarray:
+    """Waves along a range, from the whole of it down to teeth of a gear, shape (R, F); q of shape (R, 1)."""
     x = (q - q.min()) / max(float(np.ptp(q)), 1e-12)
     angle = 2.0 * np.pi * x * np.arange(1, WAVES + 1)
-    waves = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
-    return np.concatenate([waves, direction * waves, direction], axis=1)
+    return np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def _memory(stretches: list[Stretch], j: int, rows: Rows) -> np.ndarray:
-    """Oscillators of many frequencies shaken by the joint's acceleration: positions and speeds, shape (R, F)."""
-    parts = []
+    """What the motion so far has left behind, shape (R, F).
+
+    Oscillators of many frequencies shaken by the joint's acceleration, positions and speeds; hysteresis that settles
+    along a travel; and what was strained and gives way in time.
+    """
+    parts, span = [], max(float(np.ptp(np.concatenate([s.q[:, j] for s in stretches]))), 1e-12)
     for s in stretches:
         dt = float(np.median(np.diff(s.t)))
         part = []
@@ -260,8 +280,12 @@ def _memory(stretches: list[Stretch], j: int, rows: Rows) -> np.ndarray:
                  np.diag([omega**2, omega]), np.zeros((2, 1))), dt, method="bilinear",
             )  # fmt: skip
             part.append(signal.dlsim(system, s.qdd[:, j])[1])
+        part.append(np.stack([relaxed(s.q[:, j], share * span) for share in TRAVELS], axis=1))
+        moved, keeps = np.diff(s.q[:, j], prepend=s.q[:1, j]), np.exp(-dt / np.array(SETTLING))
+        part.append(np.stack([signal.lfilter([1.0], [1.0, -keep], moved) for keep in keeps], axis=1))
         parts.append(np.hstack(part))
-    return np.hstack([_standard(rows.of(parts)), _standard(rows.of([s.qdd[:, [j]] for s in stretches]))])
+    now = [np.stack([s.qd[:, j], s.qdd[:, j], np.sign(s.qd[:, j])], axis=1) for s in stretches]
+    return np.hstack([_standard(rows.of(parts)), _standard(rows.of(now))])
 
 
 def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
