@@ -70,7 +70,8 @@ def test_viscous_friction_stays_beside_friction_that_grows_with_load_where_more_
 @pytest.mark.parametrize("louder", [1.0, 100.0])
 def test_what_one_recording_leaves_is_seen_to_go_with_time_however_much_louder_it_is(louder):
     rng, t = np.random.default_rng(0), 0.03 * np.arange(500)
-    one: Any = SimpleNamespace(t=t, **{k: rng.normal(size=(500, 1)) for k in ("q", "qd", "qdd", "nominal", "tau")})
+    columns = {k: rng.normal(size=(500, 1)) for k in ("q", "qd", "qdd", "nominal", "tau")}
+    one: Any = SimpleNamespace(t=t, begin=0.0, motion=0, **columns)
     quiet, slow = rng.normal(size=500), np.sqrt(2.0) * np.sin(2.0 * np.pi * 0.3 * t)
     rows = Rows(
         [np.full(500, True)] * 2, np.append(quiet, slow), np.repeat([1.0, louder], 500), np.repeat([0, 1], 500)
@@ -111,7 +112,7 @@ def shares_of(law):
     joints = [moving(0.7, 1.1, 1.0), moving(0.53, 1.37, 2.0)]
     columns = {name: np.stack([x[k] for x in joints], axis=1) for k, name in enumerate(("q", "qd", "qdd"))}
     columns["nominal"] = columns["tau"] = np.cos(columns["q"]) + 0.1 * columns["qdd"]
-    one: Any = SimpleNamespace(t=T, **columns)
+    one: Any = SimpleNamespace(t=T, begin=0.0, motion=0, **columns)
     rows = Rows([np.full(1500, True)], law(columns), np.ones(1500), np.zeros(1500, int))
     out: dict[str, float] = {}
     for c in competitors([one], 0, rows, ("hinge", "neighbour")):
@@ -154,15 +155,27 @@ def test_what_a_neighbours_torque_makes_in_loud_and_quiet_recordings_is_said_to_
         pairs = {"q": (share * q, there[0]), "qd": (share * qd, there[1]), "qdd": (share * qdd, there[2]),
                  "nominal": (np.cos(share * q), 0.0 * T), "tau": (np.cos(share * q), torque)}  # fmt: skip
         columns = {k: np.stack(v, axis=1) for k, v in pairs.items()}
-        logs.append(SimpleNamespace(
-            recording=i, t=T, use=np.full((1500, 2), True), unsure=np.zeros((1500, 2)), **columns))  # fmt: skip
+        rows = {"use": np.full((1500, 2), True), "unsure": np.zeros((1500, 2))}
+        logs.append(SimpleNamespace(recording=i, motion=i, t=T, begin=0.0, **rows, **columns))
         left.append(np.stack([torque, 0.0 * T], axis=1))
     loud, quiet = np.full(2, 10.0), np.full(2, 0.2)
     noise = Noise(np.eye(1, 11).repeat(2, axis=0), np.stack([loud, quiet]), np.stack([loud, quiet]), np.ones(2))
     ex: Any = SimpleNamespace(noise=noise, data=SimpleNamespace(stretches=logs))
     proof: Any = SimpleNamespace(left=left)
-    rows = unexplained._rows(ex, proof, 0)
-    rivals = unexplained.competitors(logs, 0, rows, ("hinge", "neighbour"))
-    shares = {c.variable: unexplained.predicted(c, rows.residual[:, None])[0] for c in rivals}
+    left_over = unexplained._rows(ex, proof, 0)
+    rivals = competitors(logs, 0, left_over, ("hinge", "neighbour"))
+    shares = {c.variable: predicted(c, left_over.residual[:, None])[0] for c in rivals}
     assert max(shares, key=lambda k: shares[k]) == "the torque of neighbour"
     assert shares["the torque of neighbour"] > 0.95
+
+
+def test_what_goes_with_time_in_repeats_of_a_motion_is_not_said_to_go_with_the_motion():
+    joints = [moving(0.7, 1.1, 1.0), moving(0.53, 1.37, 2.0)]
+    columns = {name: np.stack([x[k] for x in joints], axis=1) for k, name in enumerate(("q", "qd", "qdd"))}
+    columns["nominal"] = columns["tau"] = np.cos(columns["q"])
+    one: Any = SimpleNamespace(t=T, begin=0.0, motion=0, **columns)
+    rng = np.random.default_rng(0)
+    blocks = np.repeat(rng.normal(size=60), 25)  # the same in every repeat, and unlike anything of the motion
+    rows = Rows([np.full(1500, True)] * 3, np.tile(blocks, 3), np.ones(4500), np.repeat(np.arange(3), 1500))
+    rivals = competitors([one] * 3, 0, rows, ("hinge", "neighbour"))
+    assert max(predicted(c, rows.residual[:, None])[0] for c in rivals if c.shifts) < 0.1

@@ -239,9 +239,13 @@ def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
 
 
 def _motion_folds(stretches: list[Stretch], rows: Rows) -> np.ndarray:
-    """Contiguous stretches of `MOTION_BLOCK`, five folds: far longer than any noise remembers."""
-    t = rows.of([s.t - s.t[0] for s in stretches])
-    return ((t / MOTION_BLOCK).astype(int) + rows.recording) % 5
+    """Contiguous stretches of `MOTION_BLOCK`, five folds: far longer than any noise remembers.
+
+    Repeats of a motion are left out together: in each of them the same motion comes at the same time, so that one
+    would predict the other whatever goes with time.
+    """
+    t = rows.of([s.t - s.begin for s in stretches])
+    return ((t / MOTION_BLOCK).astype(int) + rows.of([np.full(len(s.t), s.motion) for s in stretches])) % 5
 
 
 def _standard(x: np.ndarray) -> np.ndarray:
