@@ -165,7 +165,10 @@ def shortest(stretches: list[Stretch], residuals: list[np.ndarray], j: int) -> W
 
 
 def _carrier(rivals: list[Competitor], shares: np.ndarray) -> int:
-    """The best competitor; time only where motion does not do nearly as well, for whatever is slow goes with time."""
+    """The best competitor; time only where motion does not do nearly as well.
+
+    Whatever is slow goes with time, and all but noise comes back in the repeats of a motion.
+    """
     motion = np.where([c.shifts for c in rivals], shares, -np.inf)
     return int(np.argmax(motion if motion.max() > settings.NEARLY * shares.max() else shares))
 
@@ -173,7 +176,7 @@ def _carrier(rivals: list[Competitor], shares: np.ndarray) -> int:
 def competitors(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
     """All competitors for what is left at joint `j`, weighted like the residual.
 
-    Not that of time: each recording has amplitudes of its own, which weights would make as small as the ridge.
+    Not those of time: each recording has amplitudes of its own, which weights would make as small as the ridge.
     """
     weight = (np.median(rows.level) / rows.level)[:, None]
     rivals = _unweighted(stretches, j, rows, names)
@@ -215,7 +218,7 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
         many = np.hstack([_features(np.hstack([mine(x), x[:, [i]]])) for x in (q, qd)])
         together = f"the motion of {names[i]} together with the joint's own"
         out += [Competitor(together, x, fold, True) for x in (few, many)]
-    return [*out, _time(stretches, rows)]
+    return [*out, *_repeated(stretches, rows), _time(stretches, rows)]
 
 
 def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
@@ -290,6 +293,21 @@ def _memory(stretches: list[Stretch], j: int, rows: Rows) -> np.ndarray:
         parts.append(np.hstack(part))
     now = [np.stack([s.qd[:, j], s.qdd[:, j], np.sign(s.qd[:, j])], axis=1) for s in stretches]
     return np.hstack([_standard(rows.of(parts)), _standard(rows.of(now))])
+
+
+def _repeated(stretches: list[Stretch], rows: Rows) -> list[Competitor]:
+    """What was left in the other repeats of a motion at the same time after their begin; none without repeats."""
+    at = rows.of([s.t - s.begin for s in stretches])
+    left, motion = rows.residual * rows.level, np.array([s.motion for s in stretches])
+    features = np.zeros_like(left)
+    for r in np.unique(rows.recording):
+        mine, others = rows.recording == r, [k for k in np.flatnonzero(motion == motion[r]) if k != r]
+        for k in others:
+            theirs = rows.recording == k
+            if theirs.any():
+                features[mine] += np.interp(at[mine], at[theirs], left[theirs]) / len(others)
+    said = "time or on the motion, which repeats of it can't tell apart"
+    return [Competitor(said, (features / rows.level)[:, None], rows.recording, False)] if features.any() else []
 
 
 def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
