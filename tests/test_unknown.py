@@ -78,7 +78,8 @@ def test_what_one_recording_leaves_is_seen_to_go_with_time_however_much_louder_i
     )
     time = competitors([one, one], 0, rows, ("hinge",))[-1]
     assert time.variable.startswith("time")
-    assert 0.4 < predicted(time, rows.residual[:, None])[0] < 0.6  # all of one recording, nothing of the other
+    share = predicted(time, rows.residual[:, None], rows)[0]
+    assert 0.4 < share < 0.6  # all of one recording, nothing of the other
 
 
 @pytest.mark.parametrize("lasts", [3.0, 40.0])
@@ -116,7 +117,7 @@ def shares_of(law):
     rows = Rows([np.full(1500, True)], law(columns), np.ones(1500), np.zeros(1500, int))
     out: dict[str, float] = {}
     for c in competitors([one], 0, rows, ("hinge", "neighbour")):
-        out[c.variable] = max(predicted(c, rows.residual[:, None])[0], out.get(c.variable, -np.inf))
+        out[c.variable] = max(predicted(c, rows.residual[:, None], rows)[0], out.get(c.variable, -np.inf))
     return out
 
 
@@ -164,7 +165,7 @@ def test_what_a_neighbours_torque_makes_in_loud_and_quiet_recordings_is_said_to_
     proof: Any = SimpleNamespace(left=left)
     left_over = unexplained._rows(ex, proof, 0)
     rivals = competitors(logs, 0, left_over, ("hinge", "neighbour"))
-    shares = {c.variable: predicted(c, left_over.residual[:, None])[0] for c in rivals}
+    shares = {c.variable: predicted(c, left_over.residual[:, None], left_over)[0] for c in rivals}
     assert max(shares, key=lambda k: shares[k]) == "the torque of neighbour"
     assert shares["the torque of neighbour"] > 0.95
 
@@ -178,6 +179,6 @@ def test_what_goes_with_time_in_repeats_of_a_motion_is_not_said_to_go_with_the_m
     blocks = np.repeat(rng.normal(size=60), 25)  # the same in every repeat, and unlike anything of the motion
     rows = Rows([np.full(1500, True)] * 3, np.tile(blocks, 3), np.ones(4500), np.repeat(np.arange(3), 1500))
     rivals = competitors([one] * 3, 0, rows, ("hinge", "neighbour"))
-    shares = {c.variable: predicted(c, rows.residual[:, None])[0] for c in rivals}
+    shares = {c.variable: predicted(c, rows.residual[:, None], rows)[0] for c in rivals}
     assert shares.pop("time or on the motion, which repeats of it can't tell apart") > 0.95
     assert max(shares.values()) < 0.1

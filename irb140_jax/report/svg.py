@@ -2,7 +2,7 @@
 
 import html
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 PHONE_FONT = 12.0  # of the labels on a phone, where they are largest [px]
@@ -151,6 +151,24 @@ def loop_plot(
     left = max(58.0, margin(y_marks(y, False, 5)))
     box = Box(left, 8, size[0] - 10 - left, size[1] - 44, _widened(min(places), max(places)), y)
     body = [axes(box, x_label, y_label, about=(4, 5)), *(_line(box, s.name, x, s.y) for s in series)]
+    return drawing(*size, name or y_label, "".join(body))
+
+
+def dot_plot(
+    series: Mapping[str, tuple[Sequence[float], Sequence[float]]], x_label: str, y_label: str,
+    size: tuple[float, float] = (340, 220), name: str = "",
+) -> str:  # fmt: skip
+    """Dots, by series; the page's style gives every name its colour."""
+    places, values = ([v for pair in series.values() for v in pair[i]] for i in (0, 1))
+    if len(places) < 2:
+        return ""
+    y = _widened(min(values), max(values))
+    left = max(58.0, margin(y_marks(y, False, 5)))
+    box = Box(left, 8, size[0] - 10 - left, size[1] - 44, _widened(min(places), max(places)), y)
+    body = [axes(box, x_label, y_label, about=(4, 5))]
+    for way, (xs, ys) in series.items():
+        dots = "".join(f"M{box.px(a):.1f} {box.py(b):.1f}h0" for a, b in zip(xs, ys, strict=True))
+        body.append(f'<path class="dots {way}" d="{dots}"/>')
     return drawing(*size, name or y_label, "".join(body))
 
 

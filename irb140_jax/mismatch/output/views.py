@@ -9,8 +9,10 @@ from scipy import signal
 
 from irb140_jax.mismatch.output.inertials import LinkShift
 from irb140_jax.mismatch.records import plain
+from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.mismatch.validation.unexplained import Over, Structure
 from irb140_jax.robot import Robot
 
 BINS = 14  # a side of the heat maps
@@ -19,6 +21,7 @@ TRACE_POINTS = 900  # of a joint along a recording: more than a figure can show
 FEWEST_POINTS = 150  # below which a motion of half a minute can't be recognised
 MOST_NUMBERS = 30_000  # points of all joints and recordings together: some 1.5 MB in the report
 MOST_RANKED = 25
+MOST_DOTS = 600  # of a drawing of what is left
 MODELS = ("nominal", "refit", "corrected")
 Grid = list[list[float | None]]
 Curves = dict[str, list[float | None]]  # by what they are of, for example "measured" or "corrected"
@@ -81,6 +84,25 @@ class Ranked:
 
 
 @dataclasses.dataclass(frozen=True)
+class Left:
+    """What no effect explains of a joint's torque, over what it depends on, on data that the fit did not see.
+
+    Attributes:
+        joint: Its name.
+        over: What the places are of, with its unit.
+        unit: Of the torque: "N m" or "N".
+        forth: Places and torques of some rows in which the joint moves forward.
+        back: Likewise backward.
+    """
+
+    joint: str
+    over: str
+    unit: str
+    forth: tuple[list[float], list[float]]
+    back: tuple[list[float], list[float]]
+
+
+@dataclasses.dataclass(frozen=True)
 class Views:
     """What the report draws.
 
@@ -91,6 +113,7 @@ class Views:
         motions: The recordings over time.
         ranking: Candidates, the strongest first.
         residual_spectrum: By joint: frequencies "f" [Hz], and residuals of each model [N m/sqrt(Hz)].
+        left: What has no name, a joint each.
         inertials: What refitting did to each link.
         notes: Those of the diagnosis.
         motion: What motion.json holds; None where nothing was simulated.
@@ -102,6 +125,7 @@ class Views:
     motions: tuple[Traces, ...] = ()
     ranking: tuple[Ranked, ...] = ()
     residual_spectrum: dict[str, Spectrum] = dataclasses.field(default_factory=dict)
+    left: tuple[Left, ...] = ()
     inertials: tuple[LinkShift, ...] = ()
     notes: tuple[str, ...] = ()
     motion: dict[str, Any] | None = None
@@ -136,8 +160,7 @@ def maps(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Maps]:
             heat_map(q, qd, edges, np.concatenate([r[u, j] for r, u in zip(x, use, strict=True)]))
             for x in (proof.nominal, proof.corrected)
         )
-        unit = "N" if robot.is_slide[j] else "N m"
-        out[name] = Maps(edges[0].tolist(), edges[1].tolist(), nominal, corrected, unit)
+        out[name] = Maps(edges[0].tolist(), edges[1].tolist(), nominal, corrected, _unit(robot, j))
     return out
 
 
@@ -176,6 +199,38 @@ def spectra(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Spectrum
             out[name]["f"] = f.tolist()
             out[name][kind] = np.sqrt(np.mean(density, axis=0)).tolist()
     return out
+
+
+def left(robot: Robot, ex: Explanation, proof: HeldOut, rest: Sequence[Structure]) -> tuple[Left, ...]:
+    """What has no name, over the variable that its sentence says it depends on."""
+    out = []
+    for s in rest:
+        rows = [(x.use[:, s.joint], x, y[:, s.joint]) for x, y in zip(ex.data.stretches, proof.left, strict=True)]
+        place = np.concatenate([_place(x, s.over)[use] for use, x, _ in rows])
+        torque, qd = (np.concatenate(v) for v in zip(*((y[u], x.qd[u, s.joint]) for u, x, y in rows), strict=True))
+        few = np.arange(len(place)) % -(-len(place) // MOST_DOTS) == 0
+        ways = ((place[way].tolist(), torque[way].tolist()) for way in (few & (qd > 0.0), few & (qd < 0.0)))
+        out.append(Left(robot.joint_names[s.joint], _axis(robot, s.over), _unit(robot, s.joint), *ways))
+    return tuple(out)
+
+
+def _place(s: Stretch, over: Over) -> np.ndarray:
+    return s.t - s.begin if over.quantity == "t" else getattr(s, over.quantity)[:, over.joint]
+
+
+def _axis(robot: Robot, over: Over) -> str:
+    """What an axis shows, in words and with its unit."""
+    slide, name = robot.is_slide[over.joint], robot.joint_names[over.joint]
+    length = "m" if slide else "rad"
+    return {
+        "q": f"position of {name} [{length}]", "qd": f"speed of {name} [{length}/s]",
+        "qdd": f"acceleration of {name} [{length}/s²]", "nominal": f"load of {name} [{_unit(robot, over.joint)}]",
+        "tau": f"torque of {name} [{_unit(robot, over.joint)}]", "t": "time since the recording began [s]",
+    }[over.quantity]  # fmt: skip
+
+
+def _unit(robot: Robot, joint: int) -> str:
+    return "N" if robot.is_slide[joint] else "N m"
 
 
 def ranking(robot: Robot, ex: Explanation) -> tuple[Ranked, ...]:

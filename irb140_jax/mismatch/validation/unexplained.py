@@ -6,6 +6,7 @@ changed by it.
 """
 
 import dataclasses
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,18 @@ MOST_COSINES = 600  # of a recording: along one of more than five minutes they f
 TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
 
 
+class Over(NamedTuple):
+    """What a drawing shows the residual over.
+
+    Attributes:
+        quantity: "q", "qd", "qdd", "nominal" torque or logged "tau" of a joint, or "t".
+        joint: Index.
+    """
+
+    quantity: str
+    joint: int
+
+
 class When(NamedTuple):
     """A short time that holds most of what is left.
 
@@ -62,6 +75,7 @@ class Structure:
         p_value: Share of time-shifted copies that are as predictable.
         variable: The variables that carry it, in words.
         rms: Size of the predictable part [N m or N].
+        over: One of them.
         when: Where it is that short.
     """
 
@@ -70,6 +84,7 @@ class Structure:
     p_value: float
     variable: str
     rms: float
+    over: Over
     when: When | None = None
 
 
@@ -78,12 +93,14 @@ class Competitor(NamedTuple):
 
     Attributes:
         variable: The variables in words.
+        over: One of them, to draw what is left over.
         features: Shape (R, F), of the order of one.
         fold: Which rows are left out together, shape (R,).
         shifts: Whether shifting time breaks what it could rightly predict, so that shifted copies make its null.
     """
 
     variable: str
+    over: Over
     features: np.ndarray
     fold: np.ndarray
     shifts: bool
@@ -121,7 +138,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
         if len(rows.residual) < 200 or least > 1.0:
             continue
         rivals = competitors(ex.data.stretches, j, rows, ex.lib.robot.joint_names)
-        shares = np.array([predicted(c, rows.residual[:, None])[0] for c in rivals])
+        shares = np.array([predicted(c, rows.residual[:, None], rows)[0] for c in rivals])
         if shares.max() < least:
             continue
         null = _null(rivals, rows)
@@ -134,7 +151,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
                 size = float(np.sqrt(share) * rmse[j])
                 both = zip(ex.data.stretches, proof.left, strict=True)
                 when = shortest(ex.data.stretches, [np.where(s.use, r, 0.0)[:, j] for s, r in both], j)
-                out.append(Structure(j, share, p, rivals[best].variable, size, when))
+                out.append(Structure(j, share, p, rivals[best].variable, size, rivals[best].over, when))
                 break
     return out
 
@@ -180,9 +197,7 @@ def competitors(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
     """
     weight = (np.median(rows.level) / rows.level)[:, None]
     rivals = _unweighted(stretches, j, rows, names)
-    # Each has a constant of its own: that of the residual is taken off, and may be another in its few variables.
-    weighted = [weight * np.hstack([c.features, np.ones_like(weight)]) for c in rivals]
-    return [c._replace(features=x) if c.shifts else c for c, x in zip(rivals, weighted, strict=True)]
+    return [c._replace(features=weight * c.features) if c.shifts else c for c in rivals]
 
 
 def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, ...]) -> list[Competitor]:
@@ -194,30 +209,30 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
     mine = lambda x: x[:, [j]]  # noqa: E731
     waves = _waves(mine(q))
     groups = {
-        "position": np.hstack([_features(mine(q)), waves]),
-        "speed": _features(mine(qd)),
-        "acceleration": _features(mine(qdd)),
-        "load": _features(mine(load)),
-        "position and speed": _features(np.hstack([mine(q), mine(qd)])),
-        "position and its direction of motion": np.hstack([waves, direction * waves, direction]),
-        "load and speed": _features(np.hstack([mine(load), mine(qd)])),
-        "own past": _memory(stretches, j, rows),
+        "position": ("q", np.hstack([_features(mine(q)), waves])),
+        "speed": ("qd", _features(mine(qd))),
+        "acceleration": ("qdd", _features(mine(qdd))),
+        "load": ("nominal", _features(mine(load))),
+        "position and speed": ("q", _features(np.hstack([mine(q), mine(qd)]))),
+        "position and its direction of motion": ("q", np.hstack([waves, direction * waves, direction])),
+        "load and speed": ("nominal", _features(np.hstack([mine(load), mine(qd)]))),
+        "own past": ("q", _memory(stretches, j, rows)),
     }
     fold, others = _motion_folds(stretches, rows), [i for i in range(len(names)) if i != j]
-    out = [Competitor(f"the joint's {name}", x, fold, True) for name, x in groups.items()]
+    out = [Competitor(f"the joint's {name}", Over(by, j), x, fold, True) for name, (by, x) in groups.items()]
     # Not the joint's own logged torque: what is left is a part of it.
-    out += [Competitor(f"the torque of {names[i]}", _features(tau[:, [i]]), fold, True) for i in others]
-    out += [
-        Competitor(f"the position of {names[i]} and the joint's own direction of motion",
-                   np.hstack([direction * _features(q[:, [i]]), direction]), fold, True) for i in others
-    ]  # fmt: skip
+    out += [Competitor(f"the torque of {names[i]}", Over("tau", i), tau[:, [i]], fold, True) for i in others]
+    for i in others:
+        led = np.hstack([direction * _features(q[:, [i]]), direction])
+        said = f"the position of {names[i]} and the joint's own direction of motion"
+        out.append(Competitor(said, Over("q", i), led, fold, True))
     own = np.hstack([np.ones_like(direction), direction, *(mine(x) for x in (q, qd, load))])
     for i in others:
         theirs = np.stack([q[:, i], qd[:, i], np.abs(qd[:, i]), np.sign(qd[:, i]), qdd[:, i]], axis=1)
         few = (own[:, :, None] * theirs[:, None]).reshape(len(own), -1)
         many = np.hstack([_features(np.hstack([mine(x), x[:, [i]]])) for x in (q, qd)])
         together = f"the motion of {names[i]} together with the joint's own"
-        out += [Competitor(together, x, fold, True) for x in (few, many)]
+        out += [Competitor(together, Over("qd", i), x, fold, True) for x in (few, many)]
     return [*out, *_repeated(stretches, rows), _time(stretches, rows)]
 
 
@@ -233,10 +248,11 @@ def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
     recording = np.repeat(np.arange(len(pick)), [p.sum() for p in pick])
     y = np.concatenate([c[p, j] for c, p in zip(proof.left, pick, strict=True)]) / level
     if len(y):
-        # A constant of all recordings, in N m: they are not equally loud, and no structure.
-        y = y - (y @ (1.0 / level)) / np.sum(level**-2.0) / level
+        y = y - (y @ (1.0 / level)) / np.sum(level**-2.0) / level  # a constant in N m: recordings aren't equally loud
+        middle = np.median(np.abs(y))
         for r in np.unique(recording):
-            limit = 6.0 * np.median(np.abs(y[recording == r])) + 1e-12
+            # All of a quiet recording may be off by many times its noise, and that is no outlier.
+            limit = 6.0 * max(middle, np.median(np.abs(y[recording == r]))) + 1e-12
             y[recording == r] = np.clip(y[recording == r], -limit, limit)
     return Rows(pick, y, level, recording)
 
@@ -307,7 +323,8 @@ def _repeated(stretches: list[Stretch], rows: Rows) -> list[Competitor]:
             if theirs.any():
                 features[mine] += np.interp(at[mine], at[theirs], left[theirs]) / len(others)
     said = "time or on the motion, which repeats of it can't tell apart"
-    return [Competitor(said, (features / rows.level)[:, None], rows.recording, False)] if features.any() else []
+    known = (features / rows.level)[:, None]
+    return [Competitor(said, Over("t", 0), known, rows.recording, False)] if features.any() else []
 
 
 def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
@@ -324,27 +341,49 @@ def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
     for _, own in features:
         phi[row : row + len(own), column : column + own.shape[1]] = own
         row, column = row + len(own), column + own.shape[1]
-    return Competitor("time more than on the motion", phi, np.concatenate(folds), False)
+    return Competitor("time more than on the motion", Over("t", 0), phi, np.concatenate(folds), False)
 
 
-def predicted(c: Competitor, Y: np.ndarray) -> np.ndarray:
-    """Share of each column's variance that ridge regression on the features predicts on left-out folds."""
-    return 1.0 - _missed(c, Y) / np.maximum(np.sum(Y**2, axis=0), 1e-300)
+def predicted(c: Competitor, Y: np.ndarray, rows: Rows) -> np.ndarray:
+    """Share of each column's variance that ridge regression on the features predicts on left-out folds.
+
+    What motion predicts is fitted to differences within recordings.  That it predicts those between recordings as well
+    speaks for it; that they are there does not, for copies that are shifted in time have them, too.
+    """
+    total, missed = np.maximum(np.sum(Y**2, axis=0), 1e-300), np.zeros((len(RIDGES), Y.shape[1]))
+    if not c.shifts:
+        for k, test, w in _fits(c.features, Y, c.fold):
+            missed[k] += np.sum((Y[test] - c.features[test] @ w) ** 2, axis=0)
+        return 1.0 - missed.min(axis=0) / total
+    X, within, among = _centred(c.features, rows.recording), _centred(Y, rows.recording), np.zeros_like(missed)
+    one, sums = 1.0 / rows.level, lambda at: (one[at] @ Y[at], one[at] @ c.features[at], one[at] @ one[at])
+    whole = sums(slice(None))
+    for k, test, w in _fits(X, within, c.fold):
+        missed[k] += np.sum((within[test] - X[test] @ w) ** 2, axis=0)
+        of_y, of_features, of_one = (a - b for a, b in zip(whole, sums(test), strict=True))
+        constant = (of_y - of_features @ w) / of_one  # [N m or N], of all recordings
+        among[k] += np.sum((Y[test] - c.features[test] @ w - np.outer(one[test], constant)) ** 2, axis=0)
+    return np.maximum(np.sum(within**2, axis=0) - missed.min(axis=0), total - among.min(axis=0)) / total
 
 
-def _missed(c: Competitor, Y: np.ndarray) -> np.ndarray:
-    """Squared error of each column on left-out folds, with the best ridge."""
-    missed = np.zeros((len(RIDGES), Y.shape[1]))
-    whole, cross = c.features.T @ c.features, c.features.T @ Y
-    for f in np.unique(c.fold):
-        test = c.fold == f
-        A = c.features[test]
+def _centred(X: np.ndarray, recording: np.ndarray) -> np.ndarray:
+    """Columns (R, K) less their mean over each recording."""
+    _, which, count = np.unique(recording, return_inverse=True, return_counts=True)
+    means = np.zeros((len(count), X.shape[1]))
+    np.add.at(means, which, X)
+    return X - (means / count[:, None])[which]
+
+
+def _fits(X: np.ndarray, Y: np.ndarray, fold: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+    """Number of a ridge, the rows that are left out, and the coefficients (F, K) that the others give with it."""
+    whole, cross = X.T @ X, X.T @ Y
+    for f in np.unique(fold):
+        test = fold == f
+        A = X[test]
         values, vectors = np.linalg.eigh(whole - A.T @ A)
-        seen, projected = A @ vectors, vectors.T @ (cross - A.T @ Y[test])
+        projected = vectors.T @ (cross - A.T @ Y[test])
         for k, ridge in enumerate(RIDGES):
-            w = projected / (np.maximum(values, 0.0) + ridge * max((~test).sum(), 1))[:, None]
-            missed[k] += np.sum((Y[test] - seen @ w) ** 2, axis=0)
-    return missed.min(axis=0)
+            yield k, test, vectors @ (projected / (np.maximum(values, 0.0) + ridge * max((~test).sum(), 1))[:, None])
 
 
 def _null(rivals: list[Competitor], rows: Rows) -> np.ndarray:
@@ -355,4 +394,4 @@ def _null(rivals: list[Competitor], rows: Rows) -> np.ndarray:
         at = np.flatnonzero(rows.recording == r)
         for k in range(SHIFTS):
             copies[at, k] = np.roll(rows.residual[at], rng.integers(len(at) // 10, max(len(at) - len(at) // 10, 2)))
-    return np.max([predicted(c, copies) for c in rivals if c.shifts], axis=0)
+    return np.max([predicted(c, copies, rows) for c in rivals if c.shifts], axis=0)
