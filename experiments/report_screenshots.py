@@ -1,6 +1,7 @@
 """Pictures of a report as people see it: desktop, phone, dark and on paper.  Needs Chromium, and no network.
 
     python experiments/report_screenshots.py demo/report.html --out docs/figures/report
+    python experiments/report_screenshots.py out/report.html --section unexplained     # one section alone
 
 It ends with an error if the page scrolls sideways on a phone, or if its cursor reads nothing.
 """
@@ -20,7 +21,7 @@ FLAGS = (
 )  # fmt: skip
 DARK = "--blink-settings=preferredColorScheme=0"
 PHONE = 390  # width [CSS pixels]
-FIRST_SCREEN, HEIGHT = 1290, 2900  # of the pictures [CSS pixels]
+FIRST_SCREEN, HEIGHT, SECTION = 1290, 2900, 600  # of the pictures [CSS pixels]
 PATIENCE = 120  # [s]
 
 
@@ -78,6 +79,23 @@ def taken(report: pathlib.Path, out: pathlib.Path) -> list[pathlib.Path]:
     return made
 
 
+def section(report: pathlib.Path, name: str, out: pathlib.Path) -> pathlib.Path:
+    """Write a picture of one section."""
+    source = report.read_text(encoding="utf-8")
+    found = re.search(rf'<section id="{name}">.*?</section>', source, re.S)
+    if found is None:
+        raise SystemExit(f"report_screenshots: {report} has no section {name!r}")
+    alone = "section h2 { margin-top: 0; border: 0; } main { padding-top: 0; }"
+    head = source[: source.index("<main>")].replace("</style>", f"{alone}</style>", 1)
+    picture = out / f"{name}.png"
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder) / "section.html"
+        file.write_text(f"{head}<main>{found[0]}</main></body></html>", encoding="utf-8")
+        chromium(f"--window-size=1000,{SECTION}", f"--screenshot={picture}", file.as_uri())
+    _compressed(picture)
+    return picture
+
+
 def _compressed(picture: pathlib.Path) -> None:
     """256 colours are enough for a page of text and lines, at a third of the size."""
     from PIL import Image
@@ -90,8 +108,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("report", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("docs/figures/report"))
+    parser.add_argument("--section", help="identifier of a section to take alone")
     words = parser.parse_args()
-    for path in taken(words.report, words.out):
+    made = [section(words.report, words.section, words.out)] if words.section else taken(words.report, words.out)
+    for path in made:
         print(f"{path}: {path.stat().st_size // 1024} kB", file=sys.stderr)
 
 
