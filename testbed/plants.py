@@ -152,7 +152,11 @@ def torque_along(
     """
     fine = np.arange(t[0], t[-1], STEP)
     at = lambda x: interpolate.CubicSpline(t, x)(fine)  # noqa: E731
-    tau = channels(plant, Motion(fine, at(2.0 * q - as_read(plant, q)), at(qd), at(qdd), number))[1]
+    true, speed, bend = 2.0 * q - as_read(plant, q), at(qd), at(qdd)
+    for j in plant.misread:
+        path = interpolate.CubicSpline(t, true[:, j])
+        speed[:, j], bend[:, j] = path(fine, 1), path(fine, 2)
+    tau = channels(plant, Motion(fine, at(true), speed, bend, number))[1]
     return np.stack([np.interp(t, fine, c) for c in tau.T], axis=1)
 
 
