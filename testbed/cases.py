@@ -117,7 +117,7 @@ def make(
         index: 0, 1, 2, ...
         commit: Seeds "final".
         vary: Conditions other than those drawn.
-        mixture: What may be hidden: `PASS`, or `OUTSIDE` for what neither it nor the library has.
+        mixture: What may be hidden: `PASS`, or `OUTSIDE` for what it does not have, most of it without a name.
     """
     rng, moving, logging = (generator(draw, index, stream, commit) for stream in ("plant", "motions", "logger"))
     kinds = kinds_of(draw, index, commit, mixture)

@@ -1,7 +1,7 @@
-"""Kinds of physics that neither the library nor the mixture of the other draws has; see `rubbing` for the arguments.
+"""Kinds of physics outside the mixture of the other draws, most of them without a name; see `rubbing` for arguments.
 
-Most have no name in the contract.  What is right is that something is left, or named alike, at the joints that carry
-them: a name that says something else is false.
+Of those without a name it is right to say that something is left, or a name alike, at the joints that carry them: a
+name that says something else is false.
 """
 
 import numpy as np
@@ -190,7 +190,7 @@ def hanging_load(plant, sizes, rng, j, torque):
 
 
 def soft_wall(plant, sizes, rng, j, torque):
-    """A foam that the joint is pressed into on both ends of its range, softer as it goes in than as it comes out."""
+    """A foam that the joint is pressed into on both ends of its range, which pushes back less on the way out."""
     room = rng.uniform(0.1, 0.25) * (sizes.high[j] - sizes.low[j])
     plant.laws.append(on(j, lambda m, load: 8.0 * torque * surroundings.foam(
         m.q[:, j], m.qd[:, j], sizes.low[j] + room, sizes.high[j] - room, room)))  # fmt: skip

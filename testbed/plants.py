@@ -27,7 +27,7 @@ class Hidden:
         tolerate: Names that are not wrong beside it.
         role: "special"; "ordinary" friction; or "instrument", which may but need not be named.
         unnamed: Whether saying that something is left, or a note, is right, too.
-        depends: Words, one of which a sentence on what is left there has to say of what it depends on.
+        depends: Words: what is left there is rightly said to depend on something if one of them is in the sentence.
     """
 
     kind: str

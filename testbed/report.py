@@ -150,7 +150,7 @@ def in_closed_loop(forms: dict[str, Lines]) -> str:
 
 
 def outside(draws: dict[str, Lines]) -> str:
-    """Cases of physics that neither the library nor the usual mixture has, a row for each draw."""
+    """Cases of physics outside the usual mixture, a row for each draw."""
     rows = []
     for draw, every in draws.items():
         lines = [x for x in every if x["diagnosis"]]

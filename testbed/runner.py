@@ -4,7 +4,7 @@
     python -m testbed.runner check --count 300          # ... of *check*: every run of it is a look that counts
     python -m testbed.runner final --commit HASH
     python -m testbed.runner work --servo known         # servos in closed loop, of which gains are known
-    python -m testbed.runner work --outside             # physics that neither the library nor the usual mixture has
+    python -m testbed.runner work --outside             # physics outside the usual mixture, most of it without a name
     python -m testbed.runner work --label new --call irb140_jax.another:diagnose
 
 One JSON line a case is appended to results/testbed_DRAW.jsonl as it is done, so an interrupted run goes on where it
@@ -50,7 +50,7 @@ class Config:
     longer: float = 1.0
     error: float | None = None
     outside: bool = False
-    """Physics that neither the library nor the usual mixture has."""
+    """Physics outside the usual mixture, most of it without a name."""
     servo: Form | None = None
     """A case of servos in closed loop: what is logged, or known of its gains."""
     call: str = "irb140_jax.mismatch:diagnose"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from irb140_jax.mismatch.output.inertials import LinkShift
-from irb140_jax.mismatch.output.views import Left, Maps, Ranked, Traces, Views
+from irb140_jax.mismatch.output.views import Maps, Ranked, Traces, UnexplainedTorque, Views
 from irb140_jax.mismatch.result import Diagnosis
 
 JOINTS = tuple(f"joint{i}" for i in range(1, 7))
@@ -154,7 +154,9 @@ def example_views() -> Views:
             Ranked("viscous_friction", ("joint5",), 3.2, 0.01, False, "given the others"),
         ),
         residual_spectrum=spectra,
-        left=(Left("joint4", "position of joint5 [rad]", "N m", ([0.1, 0.2, 0.4], [1.0, 1.5, 2.0]), ([0.3], [-1.7])),),
+        unexplained=(UnexplainedTorque(
+            "joint4", "position of joint5 [rad]", "N m", ([0.1, 0.2, 0.4], [1.0, 1.5, 2.0]), ([0.3, 0.5], [-1.7, -2.0])
+        ),),
         inertials=(LinkShift("link2", 2.6, 16.06, 17.31, "link2 is 7.8 % heavier than the model says."),),
         notes=example_diagnosis().notes,
     )

@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.validation.unexplained import Over, Structure, When
+from irb140_jax.mismatch.validation.unexplained import Axis, Structure, When
 from irb140_jax.mismatch.validation.unexplained_time import common_time, without
 from irb140_jax.recordings import Recording
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
@@ -17,7 +17,7 @@ from irb140_jax.robot import robot_from_model
 
 
 def left(joint: int, when: When | None) -> Structure:
-    return Structure(joint, 0.5, 0.01, "time", 1.0, Over("t", 0), when)
+    return Structure(joint, 0.5, 0.01, "time", 1.0, Axis("t", 0), when)
 
 
 def test_the_time_of_most_joints_is_common_where_theirs_overlap():

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from irb140_jax.mismatch.output.views import MODELS, Left, Maps, Spectrum, Traces
+from irb140_jax.mismatch.output.views import MODELS, Maps, Spectrum, Traces, UnexplainedTorque
 from irb140_jax.report import svg, svg_maps, text
 
 FULL_COLOUR = 0.98  # share of cells below the full colour, so that a single bad cell can't wash out a map
@@ -64,11 +64,12 @@ def spectrum(joint: str, data: Spectrum, unit: str) -> dict:
     return {"joint": joint, "drawing": Markup(drawn)}
 
 
-def left(data: Left) -> dict:
+def unexplained(data: UnexplainedTorque) -> dict:
     """What no effect explains, over what it depends on."""
-    ways = {"forth": data.forth, "back": data.back}
+    ways = {"forward": data.forward, "backward": data.backward}
     name = f"Torque of {data.joint} that no effect explains, over {data.over}"
-    return {"joint": data.joint, "drawing": Markup(svg.dot_plot(ways, data.over, f"left [{data.unit}]", name=name))}
+    drawn = svg.dot_plot(ways, data.over, f"unexplained [{data.unit}]", name=name)
+    return {"joint": data.joint, "drawing": Markup(drawn)}
 
 
 def _power(values: Sequence[float | None]) -> float:

@@ -53,7 +53,7 @@ def html_report(
         maps=[{"joint": joint, **figures.map_pair(data)} for joint, data in views.maps.items()],
         panels=[figures.panel(joint, units[joint], views.motions) for joint in joints if views.motions],
         spectra=[figures.spectrum(joint, data, units[joint]) for joint, data in views.residual_spectrum.items()],
-        left=[figures.left(data) for data in views.left],
+        unexplained=[figures.unexplained(data) for data in views.unexplained],
         motion=motion_section(views.motion) if views.motion else None,
         # What the summary says of a link is not said again in the table.
         inertials=[replace(x, sentence="") if x.sentence in diagnosis.summary else x for x in views.inertials],

@@ -201,7 +201,7 @@ def report_views(of: Found, said: tuple[str, ...], motion: dict[str, Any] | None
     return rounded(views.Views(
         robot.joint_names, tuple(of.data.names), views.maps(robot, ex, proof),
         views.motions(robot, ex, proof, of.data.names), views.ranking(robot, ex), views.spectra(robot, ex, proof),
-        views.left(robot, ex, proof, of.rest), link_shifts(robot, ex), said, motion,
+        views.unexplained_torques(robot, ex, proof, of.rest), link_shifts(robot, ex), said, motion,
     ))  # fmt: skip
 
 

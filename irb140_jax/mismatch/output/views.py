@@ -12,7 +12,7 @@ from irb140_jax.mismatch.records import plain
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
-from irb140_jax.mismatch.validation.unexplained import Over, Structure
+from irb140_jax.mismatch.validation.unexplained import Axis, Structure
 from irb140_jax.robot import Robot
 
 BINS = 14  # a side of the heat maps
@@ -21,7 +21,6 @@ TRACE_POINTS = 900  # of a joint along a recording: more than a figure can show
 FEWEST_POINTS = 150  # below which a motion of half a minute can't be recognised
 MOST_NUMBERS = 30_000  # points of all joints and recordings together: some 1.5 MB in the report
 MOST_RANKED = 25
-MOST_DOTS = 600  # of a drawing of what is left
 MODELS = ("nominal", "refit", "corrected")
 Grid = list[list[float | None]]
 Curves = dict[str, list[float | None]]  # by what they are of, for example "measured" or "corrected"
@@ -84,22 +83,22 @@ class Ranked:
 
 
 @dataclasses.dataclass(frozen=True)
-class Left:
+class UnexplainedTorque:
     """What no effect explains of a joint's torque, over what it depends on, on data that the fit did not see.
 
     Attributes:
         joint: Its name.
-        over: What the places are of, with its unit.
+        over: Label of the horizontal axis, with its unit.
         unit: Of the torque: "N m" or "N".
-        forth: Places and torques of some rows in which the joint moves forward.
-        back: Likewise backward.
+        forward: Values on that axis, and torques, of some rows in which the joint moves forward, (R,) each.
+        backward: Likewise backward.
     """
 
     joint: str
     over: str
     unit: str
-    forth: tuple[list[float], list[float]]
-    back: tuple[list[float], list[float]]
+    forward: tuple[list[float], list[float]]
+    backward: tuple[list[float], list[float]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,7 +112,7 @@ class Views:
         motions: The recordings over time.
         ranking: Candidates, the strongest first.
         residual_spectrum: By joint: frequencies "f" [Hz], and residuals of each model [N m/sqrt(Hz)].
-        left: What has no name, a joint each.
+        unexplained: What has no name, a joint each.
         inertials: What refitting did to each link.
         notes: Those of the diagnosis.
         motion: What motion.json holds; None where nothing was simulated.
@@ -125,7 +124,7 @@ class Views:
     motions: tuple[Traces, ...] = ()
     ranking: tuple[Ranked, ...] = ()
     residual_spectrum: dict[str, Spectrum] = dataclasses.field(default_factory=dict)
-    left: tuple[Left, ...] = ()
+    unexplained: tuple[UnexplainedTorque, ...] = ()
     inertials: tuple[LinkShift, ...] = ()
     notes: tuple[str, ...] = ()
     motion: dict[str, Any] | None = None
@@ -201,32 +200,34 @@ def spectra(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Spectrum
     return out
 
 
-def left(robot: Robot, ex: Explanation, proof: HeldOut, rest: Sequence[Structure]) -> tuple[Left, ...]:
+def unexplained_torques(
+    robot: Robot, ex: Explanation, proof: HeldOut, rest: Sequence[Structure]
+) -> tuple[UnexplainedTorque, ...]:
     """What has no name, over the variable that its sentence says it depends on."""
     out = []
     for s in rest:
         rows = [(x.use[:, s.joint], x, y[:, s.joint]) for x, y in zip(ex.data.stretches, proof.left, strict=True)]
-        place = np.concatenate([_place(x, s.over)[use] for use, x, _ in rows])
+        place = np.concatenate([_along(x, s.axis)[use] for use, x, _ in rows])
         torque, qd = (np.concatenate(v) for v in zip(*((y[u], x.qd[u, s.joint]) for u, x, y in rows), strict=True))
-        few = np.arange(len(place)) % -(-len(place) // MOST_DOTS) == 0
+        few = np.arange(len(place)) % -(-len(place) // TRACE_POINTS) == 0
         ways = ((place[way].tolist(), torque[way].tolist()) for way in (few & (qd > 0.0), few & (qd < 0.0)))
-        out.append(Left(robot.joint_names[s.joint], _axis(robot, s.over), _unit(robot, s.joint), *ways))
+        out.append(UnexplainedTorque(robot.joint_names[s.joint], _label(robot, s.axis), _unit(robot, s.joint), *ways))
     return tuple(out)
 
 
-def _place(s: Stretch, over: Over) -> np.ndarray:
-    return s.t - s.begin if over.quantity == "t" else getattr(s, over.quantity)[:, over.joint]
+def _along(s: Stretch, axis: Axis) -> np.ndarray:
+    return s.t - s.begin if axis.quantity == "t" else getattr(s, axis.quantity)[:, axis.joint]
 
 
-def _axis(robot: Robot, over: Over) -> str:
+def _label(robot: Robot, axis: Axis) -> str:
     """What an axis shows, in words and with its unit."""
-    slide, name = robot.is_slide[over.joint], robot.joint_names[over.joint]
+    slide, name = robot.is_slide[axis.joint], robot.joint_names[axis.joint]
     length = "m" if slide else "rad"
     return {
         "q": f"position of {name} [{length}]", "qd": f"speed of {name} [{length}/s]",
-        "qdd": f"acceleration of {name} [{length}/s²]", "nominal": f"load of {name} [{_unit(robot, over.joint)}]",
-        "tau": f"torque of {name} [{_unit(robot, over.joint)}]", "t": "time since the recording began [s]",
-    }[over.quantity]  # fmt: skip
+        "qdd": f"acceleration of {name} [{length}/s²]", "nominal": f"load of {name} [{_unit(robot, axis.joint)}]",
+        "tau": f"torque of {name} [{_unit(robot, axis.joint)}]", "t": "time since the recording began [s]",
+    }[axis.quantity]  # fmt: skip
 
 
 def _unit(robot: Robot, joint: int) -> str:

@@ -36,8 +36,8 @@ MOST_COSINES = 600  # of a recording: along one of more than five minutes they f
 TIME_BLOCK = 0.5  # s: half a period of that; left out in turn
 
 
-class Over(NamedTuple):
-    """What a drawing shows the residual over.
+class Axis(NamedTuple):
+    """Horizontal axis of a drawing of the residual.
 
     Attributes:
         quantity: "q", "qd", "qdd", "nominal" torque or logged "tau" of a joint, or "t".
@@ -75,7 +75,7 @@ class Structure:
         p_value: Share of time-shifted copies that are as predictable.
         variable: The variables that carry it, in words.
         rms: Size of the predictable part [N m or N].
-        over: One of them.
+        axis: One of them, to draw what is left over it.
         when: Where it is that short.
     """
 
@@ -84,7 +84,7 @@ class Structure:
     p_value: float
     variable: str
     rms: float
-    over: Over
+    axis: Axis
     when: When | None = None
 
 
@@ -93,14 +93,14 @@ class Competitor(NamedTuple):
 
     Attributes:
         variable: The variables in words.
-        over: One of them, to draw what is left over.
+        axis: One of them, to draw what is left over it.
         features: Shape (R, F), of the order of one.
         fold: Which rows are left out together, shape (R,).
         shifts: Whether shifting time breaks what it could rightly predict, so that shifted copies make its null.
     """
 
     variable: str
-    over: Over
+    axis: Axis
     features: np.ndarray
     fold: np.ndarray
     shifts: bool
@@ -151,7 +151,7 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
                 size = float(np.sqrt(share) * rmse[j])
                 both = zip(ex.data.stretches, proof.left, strict=True)
                 when = shortest(ex.data.stretches, [np.where(s.use, r, 0.0)[:, j] for s, r in both], j)
-                out.append(Structure(j, share, p, rivals[best].variable, size, rivals[best].over, when))
+                out.append(Structure(j, share, p, rivals[best].variable, size, rivals[best].axis, when))
                 break
     return out
 
@@ -207,32 +207,32 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
     )
     direction = np.sign(rows.of([s.qd[:, [j]] for s in stretches]))
     mine = lambda x: x[:, [j]]  # noqa: E731
-    waves = _waves(mine(q))
+    along = _waves(mine(q))
     groups = {
-        "position": ("q", np.hstack([_features(mine(q)), waves])),
+        "position": ("q", np.hstack([_features(mine(q)), along])),
         "speed": ("qd", _features(mine(qd))),
         "acceleration": ("qdd", _features(mine(qdd))),
         "load": ("nominal", _features(mine(load))),
         "position and speed": ("q", _features(np.hstack([mine(q), mine(qd)]))),
-        "position and its direction of motion": ("q", np.hstack([waves, direction * waves, direction])),
+        "position and its direction of motion": ("q", np.hstack([along, direction * along, direction])),
         "load and speed": ("nominal", _features(np.hstack([mine(load), mine(qd)]))),
         "own past": ("q", _memory(stretches, j, rows)),
     }
     fold, others = _motion_folds(stretches, rows), [i for i in range(len(names)) if i != j]
-    out = [Competitor(f"the joint's {name}", Over(by, j), x, fold, True) for name, (by, x) in groups.items()]
+    out = [Competitor(f"the joint's {name}", Axis(by, j), x, fold, True) for name, (by, x) in groups.items()]
     # Not the joint's own logged torque: what is left is a part of it.
-    out += [Competitor(f"the torque of {names[i]}", Over("tau", i), tau[:, [i]], fold, True) for i in others]
+    out += [Competitor(f"the torque of {names[i]}", Axis("tau", i), tau[:, [i]], fold, True) for i in others]
     for i in others:
-        led = np.hstack([direction * _features(q[:, [i]]), direction])
+        by_direction = np.hstack([direction * _features(q[:, [i]]), direction])
         said = f"the position of {names[i]} and the joint's own direction of motion"
-        out.append(Competitor(said, Over("q", i), led, fold, True))
+        out.append(Competitor(said, Axis("q", i), by_direction, fold, True))
     own = np.hstack([np.ones_like(direction), direction, *(mine(x) for x in (q, qd, load))])
     for i in others:
         theirs = np.stack([q[:, i], qd[:, i], np.abs(qd[:, i]), np.sign(qd[:, i]), qdd[:, i]], axis=1)
-        few = (own[:, :, None] * theirs[:, None]).reshape(len(own), -1)
-        many = np.hstack([_features(np.hstack([mine(x), x[:, [i]]])) for x in (q, qd)])
+        products = (own[:, :, None] * theirs[:, None]).reshape(len(own), -1)
+        waves = np.hstack([_features(np.hstack([mine(x), x[:, [i]]])) for x in (q, qd)])
         together = f"the motion of {names[i]} together with the joint's own"
-        out += [Competitor(together, Over("qd", i), x, fold, True) for x in (few, many)]
+        out += [Competitor(together, Axis("qd", i), x, fold, True) for x in (products, waves)]
     return [*out, *_repeated(stretches, rows), _time(stretches, rows)]
 
 
@@ -324,7 +324,7 @@ def _repeated(stretches: list[Stretch], rows: Rows) -> list[Competitor]:
                 features[mine] += np.interp(at[mine], at[theirs], left[theirs]) / len(others)
     said = "time or on the motion, which repeats of it can't tell apart"
     known = (features / rows.level)[:, None]
-    return [Competitor(said, Over("t", 0), known, rows.recording, False)] if features.any() else []
+    return [Competitor(said, Axis("t", 0), known, rows.recording, False)] if features.any() else []
 
 
 def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
@@ -341,7 +341,7 @@ def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
     for _, own in features:
         phi[row : row + len(own), column : column + own.shape[1]] = own
         row, column = row + len(own), column + own.shape[1]
-    return Competitor("time more than on the motion", Over("t", 0), phi, np.concatenate(folds), False)
+    return Competitor("time more than on the motion", Axis("t", 0), phi, np.concatenate(folds), False)
 
 
 def predicted(c: Competitor, Y: np.ndarray, rows: Rows) -> np.ndarray:
@@ -355,15 +355,16 @@ def predicted(c: Competitor, Y: np.ndarray, rows: Rows) -> np.ndarray:
         for k, test, w in _fits(c.features, Y, c.fold):
             missed[k] += np.sum((Y[test] - c.features[test] @ w) ** 2, axis=0)
         return 1.0 - missed.min(axis=0) / total
-    X, within, among = _centred(c.features, rows.recording), _centred(Y, rows.recording), np.zeros_like(missed)
-    one, sums = 1.0 / rows.level, lambda at: (one[at] @ Y[at], one[at] @ c.features[at], one[at] @ one[at])
+    X, within, across = _centred(c.features, rows.recording), _centred(Y, rows.recording), np.zeros_like(missed)
+    weight = 1.0 / rows.level  # what a constant of all recordings [N m or N] is in a row
+    sums = lambda at: (weight[at] @ Y[at], weight[at] @ c.features[at], weight[at] @ weight[at])  # noqa: E731
     whole = sums(slice(None))
     for k, test, w in _fits(X, within, c.fold):
         missed[k] += np.sum((within[test] - X[test] @ w) ** 2, axis=0)
-        of_y, of_features, of_one = (a - b for a, b in zip(whole, sums(test), strict=True))
-        constant = (of_y - of_features @ w) / of_one  # [N m or N], of all recordings
-        among[k] += np.sum((Y[test] - c.features[test] @ w - np.outer(one[test], constant)) ** 2, axis=0)
-    return np.maximum(np.sum(within**2, axis=0) - missed.min(axis=0), total - among.min(axis=0)) / total
+        of_y, of_features, of_weight = (a - b for a, b in zip(whole, sums(test), strict=True))
+        constant = (of_y - of_features @ w) / of_weight
+        across[k] += np.sum((Y[test] - c.features[test] @ w - np.outer(weight[test], constant)) ** 2, axis=0)
+    return np.maximum(np.sum(within**2, axis=0) - missed.min(axis=0), total - across.min(axis=0)) / total
 
 
 def _centred(X: np.ndarray, recording: np.ndarray) -> np.ndarray:
