@@ -7,7 +7,8 @@ import pytest
 from scipy import signal
 
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.validation.unexplained import Axis, Structure, When
+from irb140_jax.mismatch.validation.competitors import Axis
+from irb140_jax.mismatch.validation.unexplained import Structure, When
 from irb140_jax.mismatch.validation.unexplained_time import common_time, without
 from irb140_jax.recordings import Recording
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot

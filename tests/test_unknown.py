@@ -11,7 +11,8 @@ from irb140_jax.mismatch import diagnose, settings
 from irb140_jax.mismatch.regression.discrepancy import relaxed
 from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.validation import unexplained
-from irb140_jax.mismatch.validation.unexplained import Rows, competitors, predicted, shortest
+from irb140_jax.mismatch.validation.competitors import Rows, competitors
+from irb140_jax.mismatch.validation.unexplained import predicted, shortest
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import three_motions

@@ -11,8 +11,9 @@ from irb140_jax.mismatch.output.inertials import LinkShift
 from irb140_jax.mismatch.records import plain
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.validation.competitors import Axis
 from irb140_jax.mismatch.validation.held_out import HeldOut
-from irb140_jax.mismatch.validation.unexplained import Axis, Structure
+from irb140_jax.mismatch.validation.unexplained import Structure
 from irb140_jax.robot import Robot
 
 BINS = 14  # a side of the heat maps
