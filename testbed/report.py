@@ -18,9 +18,10 @@ from testbed.statistics import calibration_error, covered, wilson
 ROOT = pathlib.Path(__file__).parents[1]
 LOOKS = ("first", "second", "third", "", "fifth", "sixth", "seventh")  # labels of the looks at *check*
 # Labels of *check* under other conditions, as `testbed.runner` makes them.
-CONDITIONS = {"quiet": "noise and steps of the sensors / 10", "long": "recordings 10 times as long"}
-# Labels of *work* with inertials that are wrong by another share than the drawn one.
-ERRORS = {f"error_{share}": f"{100 * share:g} %" for share in (0.02, 0.1, 0.2, 0.3)}
+CONDITIONS = {"quiet": "noise and steps of the sensors / 10"}
+# Labels of *work* under other conditions.
+OF_WORK = {f"error_{share}": f"inertials {100 * share:g} % wrong" for share in (0.02, 0.1, 0.2, 0.3)}
+OF_WORK |= {"long": "recordings 10 times as long"}
 # Forms of cases of servos in closed loop: what is logged, or known of their gains.
 SERVOS = {"torque": "torque", "known": "commands; gains known", "wrong": "commands; gains about 10 % wrong",
           "unknown": "commands; gains unknown",
@@ -260,8 +261,8 @@ def main() -> None:
     looks = [look for look in (runner.read(runner.stored("check", label)) for label in LOOKS) if look]
     conditions = {said: runner.read(runner.stored("check", label)) for label, said in CONDITIONS.items()}
     conditions = {said: every for said, every in conditions.items() if any(x["diagnosis"] for x in every)}
-    errors = {said: runner.read(runner.stored("work", label)) for label, said in ERRORS.items()}
-    errors = {said: every for said, every in errors.items() if any(x["diagnosis"] for x in every)}
+    of_work = {said: runner.read(runner.stored("work", label)) for label, said in OF_WORK.items()}
+    of_work = {said: every for said, every in of_work.items() if any(x["diagnosis"] for x in every)}
     servos = {said: runner.read(runner.stored("check", f"servo_{form}")) for form, said in SERVOS.items()}
     servos = {said: every for said, every in servos.items() if any(x["diagnosis"] for x in every)}
     beyond = {draw: runner.read(runner.stored(draw, "outside")) for draw in ("work", "check")}
@@ -282,7 +283,7 @@ def main() -> None:
         mixture=", ".join(f"{n} {name}" if n > 1 else name for name, n in many.items()),
         looks=in_rows("look at *check*", {str(number): every for number, every in enumerate(looks, 1)}),
         conditions=in_rows("cases of *check* with", conditions) if conditions else "",
-        errors=in_rows("true error of the inertials", errors) if errors else "",
+        of_work=in_rows("cases of *work* with", of_work) if of_work else "",
         servos=in_closed_loop(servos) if servos else "", outside=outside(beyond) if beyond else "",
         outside_places=markdown(("hidden", "times", *PLACES), tally(last, scoring.located, PLACES)),
         outside_words=markdown(("located", "times", *WORDS), tally(last, words, WORDS)),

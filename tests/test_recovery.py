@@ -11,11 +11,11 @@ import pytest
 from scipy import signal
 
 from irb140_jax.effects.catalogue import CATALOGUE
-from irb140_jax.mismatch import Result, diagnose, predict
+from irb140_jax.mismatch import DiagnoseConfig, Result, diagnose, predict
 from irb140_jax.recordings.conceal import ConcealedCase, Concealment, conceal, random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import three_motions
-from irb140_jax.robot import Robot, robot_from_model
+from irb140_jax.robot import Robot, irb140_path, robot_from_model
 
 SEED, JOINTS, SLIDES = 6, 3, 0.3  # a hinge that carries two slides
 # Where each effect is something of its own: gains and rotors where a joint carries more than itself.
@@ -206,3 +206,17 @@ def test_a_filtered_log_is_one_delay_that_settles_in_few_rounds():
     delay = finding.parameters["delay"].value
     assert delay == pytest.approx(-np.sqrt(2.0) / (2.0 * np.pi * cut), abs=1.5e-4)
     assert sum("columns of" in sentence for sentence in said) <= 4
+
+
+def test_a_wrong_zero_of_a_first_joint_that_bears_the_arm_is_not_named_a_tilt_of_the_base():
+    """On a wall both are the same torque, and a base seldom leans about this one axis: yet a zero moves all joints."""
+    xml = irb140_path().read_text(encoding="utf-8").replace("<option ", '<option gravity="-9.81 0 0" ')
+    robot = robot_from_model(arm_spec(xml).compile(), "on a wall")
+    hidden = Concealment("encoder_offset", ("joint1",), parameters={"offset": 0.03})
+    case = conceal(xml, [hidden], three_motions(robot, 8.0, 500.0, seed=1), seed=2)
+    library = tuple(CATALOGUE[slug] for slug in (
+        "coulomb_friction", "viscous_friction", "encoder_offset", "gravity_tilt", "gravity_spring", "torque_offset",
+    ))  # fmt: skip
+    (finding,) = diagnose(robot, case.recordings, DiagnoseConfig(effects=library)).diagnosis.findings
+    assert (finding.effect, finding.joints) == ("encoder_offset", ("joint1",))
+    assert finding.parameters["offset"].value == pytest.approx(0.03, rel=0.1)

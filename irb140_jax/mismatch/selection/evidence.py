@@ -77,6 +77,11 @@ class Space:
             out = out | (alike & np.any(self.at_joint & taken.reshape(-1, 1), axis=0))
         return out
 
+    def reach(self, candidate: int) -> Sequence[int]:
+        """Joints whose torque a candidate may move."""
+        c = self.candidates[candidate]
+        return range(len(self.joints)) if not c.is_inertials and c.effect.place.everywhere else c.joints
+
     @cached_property
     def at_joint(self) -> np.ndarray:
         """Which candidates are at which joint, shape (n, candidates)."""

@@ -282,7 +282,7 @@ class Explanation:
             taken = {site_of(m) for m in self.members}
             usual = [i for i, o in enumerate(every) if o.effect.prior.ordinary and o.joints == c.joints]
             options.append((*rest, *(i for i in usual if site_of(every[i]) not in taken)))
-        joints = list(c.joints)
+        joints = list(self.space.reach(index))
         without = max(self.log_posterior(o, joints) for o in options)
         if not np.isfinite(without):
             here = {i for i, o in enumerate(every) if site_of(o) == site_of(c)}

@@ -28,10 +28,12 @@ class Search:
     def __init__(self, space: Space, hyper: Hyper, held: frozenset[Site] = frozenset()):
         self.space, self.start, self.held = space, hyper, held
         alone = len(space.joints) == 1
-        whole = [len(c.joints) == len(space.joints) and not alone for c in space.candidates]
-        self._sites = [[i for i, c in enumerate(space.candidates) if j in c.joints and not whole[i]]
+        of_arm = [len(c.joints) == len(space.joints) and not alone for c in space.candidates]
+        self._sites = [[i for i, c in enumerate(space.candidates) if j in c.joints and not of_arm[i]]
                        for j in range(len(space.joints))]  # fmt: skip
-        self._sites.append([i for i, w in enumerate(whole) if w])
+        # A zero is one joint's, and moves the torque of all.
+        felt = [len(space.reach(i)) == len(space.joints) and not alone for i in range(len(space.candidates))]
+        self._sites.append([i for i, everywhere in enumerate(felt) if everywhere])
         # What sizes of the discrepancy fitted anew may gain: the range of its features' prior volume.
         features = max(int(np.sum(g.groups >= 0)) for g in space.joints)
         self._refitting = features * np.log(settings.DISCREPANCY_SIZES[-1] / settings.DISCREPANCY_SIZES[1])
@@ -126,7 +128,7 @@ class Search:
 
         By the set's own hyperparameters or by those with less discrepancy and noise, whichever makes more of them.
         """
-        near = frozenset(m for m in chosen if joint in self.space.candidates[m].joints)
+        near = frozenset(m for m in chosen if joint in self.space.reach(m))
         if (joint, near) not in self._screened or joint == len(self.space.joints):
             self._screened[joint, near] = self._scored_anew(chosen, joint)
         return self._screened[joint, near]
@@ -159,7 +161,7 @@ class Search:
         return list(kinds.values())
 
     def _joints(self, *members: int) -> set[int]:
-        return {j for m in members for j in self.space.candidates[m].joints}
+        return {j for m in members for j in self.space.reach(m)}
 
     def _added(self, now: frozenset[int]) -> frozenset[int]:
         """One more; where none is worth it, the best effect of the whole arm with another that shows beside it."""
