@@ -209,7 +209,7 @@ def test_a_filtered_log_is_one_delay_that_settles_in_few_rounds():
 
 
 def test_a_wrong_zero_of_a_first_joint_that_bears_the_arm_is_not_named_a_tilt_of_the_base():
-    """On a wall both are the same torque, and a base seldom leans about this one axis: yet a zero moves all joints."""
+    """On a wall a base that leans about the first axis needs the same torque; few bases lean about just that axis."""
     xml = irb140_path().read_text(encoding="utf-8").replace("<option ", '<option gravity="-9.81 0 0" ')
     robot = robot_from_model(arm_spec(xml).compile(), "on a wall")
     hidden = Concealment("encoder_offset", ("joint1",), parameters={"offset": 0.03})

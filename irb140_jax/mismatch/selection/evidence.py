@@ -78,9 +78,9 @@ class Space:
         return out
 
     def reach(self, candidate: int) -> Sequence[int]:
-        """Joints whose torque a candidate may move."""
+        """Joints whose torque a candidate may move; of a link's inertials its own, though they move those before it."""
         c = self.candidates[candidate]
-        return range(len(self.joints)) if not c.is_inertials and c.effect.place.everywhere else c.joints
+        return range(len(self.joints)) if c.effect.place.everywhere else c.joints
 
     @cached_property
     def at_joint(self) -> np.ndarray:

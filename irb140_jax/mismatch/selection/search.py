@@ -27,13 +27,11 @@ class Search:
 
     def __init__(self, space: Space, hyper: Hyper, held: frozenset[Site] = frozenset()):
         self.space, self.start, self.held = space, hyper, held
-        alone = len(space.joints) == 1
-        of_arm = [len(c.joints) == len(space.joints) and not alone for c in space.candidates]
-        self._sites = [[i for i, c in enumerate(space.candidates) if j in c.joints and not of_arm[i]]
+        whole = lambda joints: 1 < len(joints) == len(space.joints)  # noqa: E731
+        self._sites = [[i for i, c in enumerate(space.candidates) if j in c.joints and not whole(c.joints)]
                        for j in range(len(space.joints))]  # fmt: skip
-        # A zero is one joint's, and moves the torque of all.
-        felt = [len(space.reach(i)) == len(space.joints) and not alone for i in range(len(space.candidates))]
-        self._sites.append([i for i, everywhere in enumerate(felt) if everywhere])
+        # A zero is one joint's, and moves the torque of all: it is at its joint, and of the whole arm.
+        self._sites.append([i for i in range(len(space.candidates)) if whole(space.reach(i))])
         # What sizes of the discrepancy fitted anew may gain: the range of its features' prior volume.
         features = max(int(np.sum(g.groups >= 0)) for g in space.joints)
         self._refitting = features * np.log(settings.DISCREPANCY_SIZES[-1] / settings.DISCREPANCY_SIZES[1])

@@ -1,6 +1,7 @@
-"""What may predict the torque that findings leave at a joint: each competitor knows few variables.
+"""Features of the regressions that may predict what the findings leave of a joint's torque.
 
-Of the joint's motion, load and past, of another joint, or time.
+Each regression, called a competitor, knows few variables: of the joint's motion, load and past, of another joint, or
+time.
 """
 
 from typing import NamedTuple

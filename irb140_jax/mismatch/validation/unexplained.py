@@ -1,6 +1,5 @@
 """Structure that no effect of the library explains: flexible competitors, scored on data that they did not see.
 
-Each competitor knows few variables: of the joint's motion, load and past, of another joint, or time.
 If one of them predicts what the findings leave, something is left out, and its variables say where.  No finding is
 changed by it.
 """
