@@ -165,7 +165,7 @@ class Prior:
             others belong to other shapes of the grid.
         adds_up: The sum of its amplitudes is bounded from below like the first of them: friction rubs everywhere.
         tied: Its amplitudes are of one order of size, which is not known: what the data can't see of one, the others
-            bound.  The first is a mass, not below zero.
+            bound.  The first is a mass, not below zero, where that is its bound.
         vector: Its amplitudes are components of one vector: what the data can't see of it may be larger than the rest.
         proportion: In which its own columns act; none where all are alike.
         dissipative: It can only take energy out of the arm, at every instant.
@@ -183,6 +183,11 @@ class Prior:
     proportion: tuple[float, ...] = ()
     dissipative: bool = False
     of_rigid_body: bool = False
+
+    @property
+    def is_mass(self) -> bool:
+        """Whether the first of amplitudes of one unknown size is a mass."""
+        return self.tied and self.lowest[:1] == (0.0,)
 
     def bounds(self, robot: Robot, joints: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest admissible amplitude of each of so many columns at a site."""

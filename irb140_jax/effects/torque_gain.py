@@ -15,6 +15,11 @@ def _columns(motion, joints, shape):
     return of_site(motion.total, joints)[:, :, None]
 
 
+def _sites(robot):
+    # Of one joint alone it is the scale of its inertials.
+    return np.arange(robot.n if robot.n > 1 else 0)[:, None]
+
+
 EFFECT = Effect(
     slug="torque_gain",
     title="a wrong torque constant",
@@ -34,9 +39,9 @@ EFFECT = Effect(
         from_physical=lambda values: (np.array([1.0 / values["gain"] - 1.0]), np.zeros(0)),
         to_log=lambda x, dt, w, shape: w[0] * x,
     ),
-    place=Place(At.LOG_SCALE, of_channel=True),
+    place=Place(At.LOG_SCALE, _sites, of_channel=True),
     # Typical is what torque constants are known to.
-    prior=Prior(typical=0.1, lowest=(1.0 / LARGEST - 1.0,), highest=(LARGEST - 1.0,)),
+    prior=Prior(typical=0.1, tied=True, lowest=(1.0 / LARGEST - 1.0,), highest=(LARGEST - 1.0,)),
     export=Export(
         mjcf="the gear of the actuator, or the gains of a position servo",
         in_model=lambda robot, joints, w, shape: with_gear(robot, joints[0], 1.0 / (1.0 + w[0])),

@@ -50,7 +50,7 @@ class Beside:
     def one_body(self, a: Candidate, b: Candidate) -> bool:
         """Whether one is a payload and the other the inertials of the link that holds it, wrong: both are one body."""
         link, payload = (a, b) if a.is_inertials else (b, a)
-        return link.is_inertials and link.joints == (self._last,) and payload.effect.prior.tied
+        return link.is_inertials and link.joints == (self._last,) and payload.effect.prior.is_mass
 
 
 def _absorbed(c: Candidate) -> set[str]:

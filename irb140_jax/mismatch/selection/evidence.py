@@ -196,7 +196,10 @@ class Space:
         """Where a set's columns have the first of each member's tied ones."""
         tied = self._tied(chosen)
         starts = self.offset + np.cumsum([0, *(len(self.columns[c]) for c in chosen)], dtype=int)[:-1]
-        return np.array([s for s in starts if tied[s]], dtype=int)
+        return np.array([s for s, c in zip(starts, chosen, strict=True) if tied[s] and self._is_mass(c)], dtype=int)
+
+    def _is_mass(self, candidate: int) -> bool:
+        return self.candidates[candidate].effect.prior.is_mass
 
     def width(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """True over stated error of the inertials that is most probable beside a set."""
@@ -329,7 +332,7 @@ class Space:
         if not len(chosen):
             return []
         G = with_prior(H[:-1, :-1] * np.outer(prior, prior))
-        mean = linalg.cho_solve((root(G), True), prior * H[:-1, -1])[self.offset :]
+        mean = (prior * linalg.cho_solve((root(G), True), prior * H[:-1, -1]))[self.offset :]
         ends = np.cumsum([len(self.columns[c]) for c in chosen])
         parts = [mean[e - len(self.columns[c]) : e] for c, e in zip(chosen, ends, strict=True)]
         return [c for c, part in zip(chosen, parts, strict=True) if self.outside(np.array([c]), part[None])[0]]
@@ -339,9 +342,9 @@ class Space:
         k = mean.shape[1]
         # Tied ones may seem impossible by what is not known of them: their bound is in the evidence.  What moves
         # nothing has an infinite one.
-        tied = np.array([self.candidates[i].effect.prior.tied for i in which], dtype=bool)
+        mass = np.array([self._is_mass(i) for i in which], dtype=bool)
         lowest = self.lowest[which, :k]
-        lowest = np.where(tied[:, None] & np.isfinite(lowest), -np.inf, lowest)
+        lowest = np.where(mass[:, None] & np.isfinite(lowest), -np.inf, lowest)
         bad = np.any((mean < lowest - 1e-9) | (mean > self.highest[which, :k] + 1e-9), axis=1)
         return bad | (np.sum(mean * self.weights[which, :k], axis=1) < self.least[which])
 

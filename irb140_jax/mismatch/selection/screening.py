@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import linalg, special
+from scipy import linalg
 
 from irb140_jax.mismatch.regression.gaussian import root, with_prior
 from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Hyper, Space, above_zero
@@ -49,7 +49,9 @@ def gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) 
         rhs = with_y[at]
         ids = which[members]
         if tied:
-            gain, mean = np.array([_of_tied(m, r) for m, r in zip(M, rhs, strict=True)]), np.zeros_like(rhs)
+            mass = [space.candidates[i].effect.prior.is_mass for i in ids]
+            each = [_of_tied(m, r, x) for m, r, x in zip(M, rhs, mass, strict=True)]
+            gain, mean = np.array([g for g, _ in each]), np.array([w for _, w in each])
         else:
             mean = np.linalg.solve(M, rhs[..., None])[..., 0]
             gain = 0.5 * np.einsum("ik,ik->i", rhs, mean) - 0.5 * np.linalg.slogdet(M)[1]
@@ -58,15 +60,23 @@ def gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) 
     return out
 
 
-def _of_tied(M: np.ndarray, rhs: np.ndarray) -> float:
-    """Log evidence that tied columns add over all widths of their prior, from M = 1 + X'X and X'y in prior units."""
+def _of_tied(M: np.ndarray, rhs: np.ndarray, is_mass: bool) -> tuple[float, np.ndarray]:
+    """Log evidence that tied columns add over all widths of their prior, and their mean at the most probable one.
+
+    Args:
+        M, rhs: 1 + X'X and X'y in prior units.
+        is_mass: Whether the first is not below zero; its mean is then not told.
+    """
     size, axes = np.linalg.eigh(M - np.eye(len(M)))
     over, along = np.outer(WIDTHS**2, np.maximum(size, 0.0)), WIDTHS[:, None] * (axes.T @ rhs)
     gain = 0.5 * np.sum(along**2 / (1.0 + over) - np.log1p(over), axis=1) + LOG_PRIOR
     best = int(np.argmax(gain))
-    weight = WIDTHS[best] * axes[0] / (1.0 + over[best])
-    first, std = weight @ along[best], np.sqrt(np.sum(WIDTHS[best] ** 2 * axes[0] ** 2 / (1.0 + over[best])))
-    return float(special.logsumexp(gain) + above_zero(first, std))
+    weight = WIDTHS[best] * axes / (1.0 + over[best])
+    mean, total = weight @ along[best], float(np.logaddexp.reduce(gain))
+    if not is_mass:
+        return total, mean
+    std = np.sqrt(np.sum(WIDTHS[best] ** 2 * axes[0] ** 2 / (1.0 + over[best])))
+    return total + float(above_zero(mean[0], std)), np.zeros_like(rhs)
 
 
 def reshaped(space: Space, chosen: Sequence[int], hyper: Hyper) -> tuple[int, ...]:
