@@ -19,7 +19,7 @@ from irb140_jax.mismatch.selection.hyperparameters import over_shapes, settled
 from irb140_jax.mismatch.selection.kinds import Kinds
 from irb140_jax.mismatch.selection.screening import gains, reshaped
 from irb140_jax.mismatch.selection.search import Search
-from irb140_jax.mismatch.selection.selected import selected
+from irb140_jax.mismatch.selection.selected import named, selected
 
 ROWS, INERTIALS, COMMON, OWN = 60, 3, 1, 5
 SLUGS = ("coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia")
@@ -334,6 +334,15 @@ def test_what_a_search_holds_is_in_every_set_it_returns():
     best, _, sets = selected(space, (0, 1), held=held)
     assert free == (2,) and best == (0, 2)
     assert all(0 in chosen for chosen in sets) and frozenset(best) in sets and not all(0 in chosen for chosen in every)
+
+
+def test_ordinary_friction_is_stated_where_one_rare_effect_explains_nearly_as_much():
+    """A wrong torque constant and a discrepancy like friction may be nearly as probable as friction itself."""
+    space, _ = planted(2, {})
+    friction, rare = (0, 1), (2,)
+    hyper = ((0,) * len(SETTING),) * 2
+    assert named(space, friction, hyper, {frozenset(friction): 0.0, frozenset(rare): -1.9}) == (friction, hyper)
+    assert named(space, rare, hyper, {frozenset(rare): 0.0, frozenset((*rare, 3)): -1.9}) == (rare, hyper)
 
 
 def test_amplitudes_that_are_not_admissible_make_a_set_impossible():
