@@ -13,13 +13,14 @@ from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gram import LEVELS, ONE, JointGram, log_prior_of_sizes, own_scale
 from irb140_jax.mismatch.regression.noise import correlation_time
 from irb140_jax.mismatch.selection.averages import probabilities
-from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Space
+from irb140_jax.mismatch.selection.evidence import Space
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.hyperparameters import over_shapes, settled
 from irb140_jax.mismatch.selection.kinds import Kinds
 from irb140_jax.mismatch.selection.screening import gains, reshaped
 from irb140_jax.mismatch.selection.search import Search
 from irb140_jax.mismatch.selection.selected import named, selected
+from irb140_jax.mismatch.selection.unknown_width import LOG_PRIOR, WIDTHS
 
 ROWS, INERTIALS, COMMON, OWN = 60, 3, 1, 5
 SLUGS = ("coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia")

@@ -5,21 +5,18 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, special
+from scipy import linalg
 
 from irb140_jax.effects import At
-from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.beside import Beside
 from irb140_jax.mismatch.columns.candidates import Candidate
-from irb140_jax.mismatch.regression.gaussian import cholesky_diagonals, posterior, root, with_prior
+from irb140_jax.mismatch.regression.gaussian import posterior, root, with_prior
 from irb140_jax.mismatch.regression.gram import LEVELS, JointGram, JointHyper
 from irb140_jax.mismatch.selection.kinds import Kinds
+from irb140_jax.mismatch.selection.unknown_width import WIDTHS, above_zero, evidences_by_width, truncated
 
 Hyper = tuple[JointHyper, ...]  # hyperparameters, one a joint
 DRY = "coulomb_friction"
-WIDTHS = 2.0**settings.WIDTH_OCTAVES  # of a prior over the one that was stated: of the inertials' or of a payload's
-_FALL = -np.log1p(settings.WIDTH_OCTAVES**2)
-LOG_PRIOR = _FALL - special.logsumexp(_FALL)  # a Cauchy distribution over octaves, cut off
 
 
 @dataclasses.dataclass(frozen=True)
@@ -179,10 +176,10 @@ class Space:
         return float(np.sum(above_zero(cov.T @ (prior * H[:-1, -1]), np.sqrt(np.diag(cov[at])))))
 
     def _by_width(self, chosen: Sequence[int], hyper: Hyper) -> tuple[np.ndarray, np.ndarray]:
-        """Gram matrix of a set's columns and y, and log evidence and prior by `_width_evidences`."""
+        """Gram matrix of a set's columns and y, and log evidence and prior by `evidences_by_width`."""
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(hyper, every, every)
-        by_width = _width_evidences(H, self.inertials, self._tied(chosen))
+        by_width = evidences_by_width(H, self.inertials, self._tied(chosen))
         best = np.unravel_index(np.argmax(by_width), by_width.shape)
         self._widths[tuple(sorted(chosen)), hyper] = float(WIDTHS[best[0]]), float(WIDTHS[best[1]])
         return H, by_width
@@ -229,8 +226,8 @@ class Space:
         H = self.gram(hyper, every, every)
         tied = self._tied(chosen)
         without = np.delete(np.delete(H, self.inertials, axis=0), self.inertials, axis=1)
-        free = _width_evidences(H, self.inertials, tied)
-        none = _width_evidences(without, self.inertials, np.delete(tied, self.inertials))
+        free = evidences_by_width(H, self.inertials, tied)
+        none = evidences_by_width(without, self.inertials, np.delete(tied, self.inertials))
         return float(np.logaddexp.reduce(free, axis=None) - np.logaddexp.reduce(none, axis=None))
 
     def lost(self, which: Sequence[int] | np.ndarray, hyper: Hyper) -> np.ndarray:
@@ -347,57 +344,3 @@ class Space:
         lowest = np.where(mass[:, None] & np.isfinite(lowest), -np.inf, lowest)
         bad = np.any((mean < lowest - 1e-9) | (mean > self.highest[which, :k] + 1e-9), axis=1)
         return bad | (np.sum(mean * self.weights[which, :k], axis=1) < self.least[which])
-
-
-def above_zero(mean: np.ndarray, std: np.ndarray) -> np.ndarray:
-    """Log of the probability that what is not below zero a priori isn't so by the data, over the prior's half."""
-    return special.log_ndtr(mean / std) + np.log(2.0)
-
-
-def truncated(mean: np.ndarray, cov: np.ndarray, at: int) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and covariance of a Gaussian where one of its variables is not below zero.
-
-    Source: Johnson, Kotz, Balakrishnan, Continuous Univariate Distributions 1, 1994, sec. 13.10.1.
-    """
-    std = float(np.sqrt(cov[at, at]))
-    z = mean[at] / std
-    ratio = float(np.exp(-0.5 * z**2 - special.log_ndtr(z)) / np.sqrt(2.0 * np.pi))
-    along = cov[:, at] / std
-    return mean + ratio * along, cov - ratio * (ratio + z) * np.outer(along, along)
-
-
-def _width_evidences(H: np.ndarray, inertials: int, tied: np.ndarray) -> np.ndarray:
-    """Log evidence and prior of each width of the inertials' prior and of that of tied columns, (WIDTHS, WIDTHS or 1).
-
-    Args:
-        H: Gram matrix of the inertials, then of other columns, then y.
-        inertials: How many inertials there are.
-        tied: Which of the columns are tied.
-    """
-    order = np.append(np.argsort(tied, kind="stable"), len(tied))
-    scale = np.ones((len(WIDTHS), len(H)))
-    scale[:, :inertials] = WIDTHS[:, None]
-    M = with_prior(H[np.ix_(order, order)] * (scale[:, :, None] * scale[:, None, :]))
-    k = int(np.count_nonzero(tied))
-    if not k:
-        return (_log_evidences(M) + LOG_PRIOR)[:, None]
-    # What is left of the tied columns and y beside all others is the same at each of their widths.
-    L = np.array([root(m) for m in M])
-    free = len(tied) - k
-    left = L[:, free:, free:] @ L[:, free:, free:].swapaxes(1, 2)
-    explained = M[:, -1, -1] - left[:, -1, -1]
-    by_inertials = LOG_PRIOR + 0.5 * explained - np.log(L[:, range(free), range(free)]).sum(axis=1)
-    left = left - np.eye(k + 1)
-    scales = np.pad(np.repeat(WIDTHS[:, None], k, axis=1), ((0, 0), (0, 1)), constant_values=1.0)
-    by_tied = [_log_evidences(with_prior(left * np.outer(s, s))) for s in scales]
-    return by_inertials[:, None] + np.transpose(by_tied) + LOG_PRIOR
-
-
-def _log_evidences(M: np.ndarray) -> np.ndarray:
-    """Log evidence of amplitudes from Gram matrices with their prior (b, k + 1, k + 1) whose last column is y, (b,).
-
-    The last pivot of a Cholesky factor that has y in it is what is left of y.
-    """
-    diagonal = cholesky_diagonals(M)
-    explained = M[:, -1, -1] - diagonal[:, -1] ** 2
-    return 0.5 * explained - np.log(diagonal[:, :-1]).sum(axis=1)

@@ -6,7 +6,8 @@ import numpy as np
 from scipy import linalg
 
 from irb140_jax.mismatch.regression.gaussian import root, with_prior
-from irb140_jax.mismatch.selection.evidence import LOG_PRIOR, WIDTHS, Hyper, Space, above_zero
+from irb140_jax.mismatch.selection.evidence import Hyper, Space
+from irb140_jax.mismatch.selection.unknown_width import added_by_tied
 
 
 def near(space: Space, chosen: Sequence[int], hyper: Hyper, columns: np.ndarray) -> np.ndarray:
@@ -50,7 +51,7 @@ def gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) 
         ids = which[members]
         if tied:
             mass = [space.candidates[i].effect.prior.is_mass for i in ids]
-            each = [_of_tied(m, r, x) for m, r, x in zip(M, rhs, mass, strict=True)]
+            each = [added_by_tied(m, r, x) for m, r, x in zip(M, rhs, mass, strict=True)]
             gain, mean = np.array([g for g, _ in each]), np.array([w for _, w in each])
         else:
             mean = np.linalg.solve(M, rhs[..., None])[..., 0]
@@ -58,25 +59,6 @@ def gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) 
         known = space.log_prior[ids] + more[ids] - space.lost(ids, hyper)
         out[members] = np.where(space.outside(ids, mean), -np.inf, gain + known)
     return out
-
-
-def _of_tied(M: np.ndarray, rhs: np.ndarray, is_mass: bool) -> tuple[float, np.ndarray]:
-    """Log evidence that tied columns add over all widths of their prior, and their mean at the most probable one.
-
-    Args:
-        M, rhs: 1 + X'X and X'y in prior units.
-        is_mass: Whether the first is not below zero; its mean is then not told.
-    """
-    size, axes = np.linalg.eigh(M - np.eye(len(M)))
-    over, along = np.outer(WIDTHS**2, np.maximum(size, 0.0)), WIDTHS[:, None] * (axes.T @ rhs)
-    gain = 0.5 * np.sum(along**2 / (1.0 + over) - np.log1p(over), axis=1) + LOG_PRIOR
-    best = int(np.argmax(gain))
-    weight = WIDTHS[best] * axes / (1.0 + over[best])
-    mean, total = weight @ along[best], float(np.logaddexp.reduce(gain))
-    if not is_mass:
-        return total, mean
-    std = np.sqrt(np.sum(WIDTHS[best] ** 2 * axes[0] ** 2 / (1.0 + over[best])))
-    return total + float(above_zero(mean[0], std)), np.zeros_like(rhs)
 
 
 def reshaped(space: Space, chosen: Sequence[int], hyper: Hyper) -> tuple[int, ...]:
