@@ -9,7 +9,7 @@ from test_tangent import BAND, ROBOT, SMOOTH, N
 from irb140_jax.effects import Scales
 from irb140_jax.mismatch.columns.along import Prepared, prepared, scales_of
 from irb140_jax.mismatch.regression.discrepancy import Discrepancy
-from irb140_jax.mismatch.regression.discrepancy import features as blocks
+from irb140_jax.mismatch.regression.discrepancy import features as features_of
 from irb140_jax.mismatch.regression.nuisances import BESIDE_FRICTION, SCALED, feature_coefficients, nuisances
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.direction import direction_of
@@ -38,7 +38,7 @@ def features(only: slice = slice(None), slower: float = 1.0) -> np.ndarray:
     one = lambda x: np.array([x])  # noqa: E731
     scales = Scales(one(np.abs(QD).max()), one(0.01), one(np.sqrt(np.mean(LOAD**2))), one(Q.min()), one(Q.max()), 20.0,
                     one(0.3), one(0.0))  # fmt: skip
-    X = np.concatenate([*blocks(motion, column(LOAD), scales, 0)][only], axis=1)
+    X = np.concatenate(features_of(motion, column(LOAD), scales, 0).blocks()[only], axis=1)
     X = X[:, X.any(axis=0)]  # no commands, so nothing that a servo does late
     return X / np.sqrt(np.mean(X**2, axis=0))
 
@@ -92,7 +92,7 @@ def test_friction_that_turns_at_once_however_slow_the_joint_is_held_by_the_block
     )  # fmt: skip
     one = lambda x: np.array([x])  # noqa: E731
     scales = Scales(one(qd.max()), rest_speed, one(1.0), one(q.min()), one(q.max()), 20.0, one(0.3), one(0.0))
-    X = [*blocks(motion, column(LOAD), scales, 0)][-1]
+    X = features_of(motion, column(LOAD), scales, 0).blocks()[-1]
     X, turned = X[:, X.any(axis=0)], np.sign(qd) - direction[:, 0]
     w = np.linalg.lstsq(X / np.sqrt(np.mean(X**2, axis=0)), turned, rcond=1e-9)[0]
     left = turned - X / np.sqrt(np.mean(X**2, axis=0)) @ w

@@ -13,13 +13,13 @@ Williams, Gaussian Processes for Machine Learning, 2006, ch. 8.
 """
 
 import dataclasses
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from irb140_jax.effects import Scales
 from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.columns.along import pieces
 from irb140_jax.recordings.condition import Conditioned
 
 ORDERS = 6  # of the polynomials in position
@@ -49,8 +49,10 @@ class Discrepancy:
         """
         out = np.zeros_like(load)
         for j in np.flatnonzero(self.coefficients.any(axis=1)):
-            blocks = (*features(r, load, self.scales, int(j)), r.direction[:, [j]])
-            out[:, j] = np.concatenate(blocks, axis=1) @ self.coefficients[j]
+            own = features(r, load, self.scales, int(j))
+            for at in pieces(len(r.t)):
+                X = np.concatenate([*own.blocks(at), r.direction[at, [j]]], axis=1)
+                out[at, j] = X @ self.coefficients[j]
         return out
 
     def on(self, joints: np.ndarray) -> "Discrepancy | None":
@@ -71,8 +73,46 @@ class Discrepancy:
         return Discrepancy(Scales(**sizes), np.array(data["coefficients"], dtype=float))
 
 
-def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> Iterator[np.ndarray]:
-    """The four blocks of one joint, each (T, features), made one by one: of a long recording each is large.
+@dataclasses.dataclass(frozen=True)
+class Features:
+    """The four blocks of one joint's features along a recording, of some samples at a time: of an hour all fill a GB.
+
+    Attributes:
+        x: Position in its range, from -1 to 1, shape (T,).
+        qd: Velocity [rad/s or m/s], shape (T,).
+        direction: Of the motion, shape (T,).
+        carried: Torque that the transmission carries over the joint's usual one, shape (T,).
+        bend: How much of the square of `carried` is what goes in proportion to it, along this recording.
+        turning: What happens around reversals, whatever the load, shape (T, 10).
+        pushed: Size of the acceleration over its RMS, shape (T,).
+        top: The joint's top speed [rad/s or m/s].
+    """
+
+    x: np.ndarray
+    qd: np.ndarray
+    direction: np.ndarray
+    carried: np.ndarray
+    bend: float
+    turning: np.ndarray
+    pushed: np.ndarray
+    top: float
+
+    def blocks(self, at: slice = slice(None)) -> list[np.ndarray]:
+        """The blocks at some samples, each (t, features)."""
+        direction = self.direction[at, None]
+        position = np.polynomial.chebyshev.chebvander(self.x[at], ORDERS)[:, 1:]
+        fast = 1.0 + 2.0 * np.log(np.abs(self.qd[at]) / self.top + 1e-3) / np.log(1e3)
+        speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
+        rounded, tails = by_speed(self.qd[at], self.direction[at], self.top)
+        carried, pushed = self.carried[at, None], self.pushed[at, None]
+        smooth = _smooth(direction, carried, self.bend, position, speed)
+        turning = np.concatenate([self.turning[at], rounded], axis=1)
+        reversal = [self.turning[at], turning * np.abs(carried), turning * pushed]
+        return [position[:, 1:], np.concatenate([rounded, tails], axis=1), smooth, np.concatenate(reversal, axis=1)]
+
+
+def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> Features:
+    """The features of one joint.
 
     Args:
         r: T samples of n joints.
@@ -81,16 +121,14 @@ def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> Iterat
         j: The joint.
     """
     middle, half = 0.5 * (scales.high[j] + scales.low[j]), 0.5 * max(scales.high[j] - scales.low[j], 1e-9)
+    carried, qdd = load[:, j] / max(float(scales.torque[j]), 1e-12), r.qdd[:, j]
+    even = np.abs(carried)
+    # Of friction that grows with load only how it bends: in proportion is a law of its own.
+    bend = float(np.sum(even**3)) / max(float(np.sum(even**2)), 1e-300)
+    pushed = np.abs(qdd) / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
     x = np.clip((r.q[:, j] - middle) / half, -1.0, 1.0)
-    position = np.polynomial.chebyshev.chebvander(x, ORDERS)[:, 1:]
-    fast = 1.0 + 2.0 * np.log(np.abs(r.qd[:, j]) / scales.speed[j] + 1e-3) / np.log(1e3)
-    speed = np.polynomial.chebyshev.chebvander(np.clip(fast, -1.0, 1.0), SPEEDS)[:, 1:]
-    rounded, tails = by_speed(r.qd[:, j], r.direction[:, j], float(scales.speed[j]))
-    carried = load[:, j] / max(float(scales.torque[j]), 1e-12)
-    yield position[:, 1:]
-    yield np.concatenate([rounded, tails], axis=1)
-    yield _smooth(r, carried, j, position, speed)
-    yield _reversal(r, carried, scales, j, rounded)
+    return Features(x, r.qd[:, j], r.direction[:, j], carried, bend, _turning(r, scales, j), pushed,
+                    float(scales.speed[j]))  # fmt: skip
 
 
 def by_speed(qd: np.ndarray, direction: np.ndarray, top: float) -> tuple[np.ndarray, np.ndarray]:
@@ -105,32 +143,28 @@ def by_speed(qd: np.ndarray, direction: np.ndarray, top: float) -> tuple[np.ndar
     return level - v / np.hypot(v, slow), level - v / (np.abs(v) + slow)
 
 
-def _smooth(r: Conditioned, carried: np.ndarray, j: int, position: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Smooth functions of several of one joint's position, speed, direction and load, shape (T, 28)."""
-    turned, even = r.direction[:, [j]], np.abs(carried)[:, None]
-    # Of friction that grows with load only how it bends: in proportion is a law of its own.
-    bend = even**2 - even * np.sum(even**3) / max(float(np.sum(even**2)), 1e-300)
+def _smooth(
+    direction: np.ndarray, carried: np.ndarray, bend: float, position: np.ndarray, speed: np.ndarray
+) -> np.ndarray:
+    """Smooth functions of several of one joint's position, speed, direction and load, shape (t, 28)."""
+    even = np.abs(carried)
     parts = [
-        turned * position, turned * speed, speed,
-        (turned * speed)[:, :, None] * position[:, None, :2],
-        turned * bend, (carried**2)[:, None], carried[:, None] * position[:, :2],
-        turned * even * position[:, :2], turned * even * speed,
+        direction * position, direction * speed, speed,
+        (direction * speed)[:, :, None] * position[:, None, :2],
+        direction * (even**2 - even * bend), carried**2, carried * position[:, :2],
+        direction * even * position[:, :2], direction * even * speed,
     ]  # fmt: skip
     return np.concatenate([p.reshape(len(position), -1) for p in parts], axis=1)
 
 
-def _reversal(r: Conditioned, carried: np.ndarray, scales: Scales, j: int, rounded: np.ndarray) -> np.ndarray:
-    """What happens around one joint's reversals, shape (T, 38)."""
-    q, qdd = r.q[:, j], r.qdd[:, j]
+def _turning(r: Conditioned, scales: Scales, j: int) -> np.ndarray:
+    """What happens around one joint's reversals, whatever the load, shape (T, 10)."""
+    q, direction = r.q[:, j], r.direction[:, j]
     travel = max(float(scales.high[j] - scales.low[j]), 1e-9)
-    direction = r.direction[:, j]
-    base = [relaxed(q, share * travel) - direction for share in settings.BRISTLE_TRAVELS]
-    base += [np.interp(r.t - late, r.t, direction) - direction for late in settings.TURNING_DELAYS]
-    base.append(through_rest(r.qd[:, j], qdd, r.t) - direction)
-    alone = np.stack(base, axis=1)
-    X, even = np.concatenate([alone, rounded], axis=1), np.abs(carried)[:, None]
-    pushed = np.abs(qdd)[:, None] / max(float(np.sqrt(np.mean(qdd**2))), 1e-12)
-    return np.concatenate([alone, X * even, X * pushed], axis=1)
+    out = [relaxed(q, share * travel) - direction for share in settings.BRISTLE_TRAVELS]
+    out += [np.interp(r.t - late, r.t, direction) - direction for late in settings.TURNING_DELAYS]
+    out.append(through_rest(r.qd[:, j], r.qdd[:, j], r.t) - direction)
+    return np.stack(out, axis=1)
 
 
 def through_rest(qd: np.ndarray, qdd: np.ndarray, t: np.ndarray) -> np.ndarray:

@@ -1,7 +1,6 @@
 """Columns of the discrepancy and of nuisance parameters with stated prior widths, such as errors of the instrument."""
 
 import dataclasses
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +8,8 @@ import numpy as np
 from irb140_jax.effects import Scales
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Prepared
-from irb140_jax.mismatch.regression.discrepancy import features
+from irb140_jax.mismatch.regression.discrepancy import Features, features
+from irb140_jax.mismatch.regression.rows import margin, row_windows
 from irb140_jax.mismatch.regression.servo import NAMES, common_columns, damping_of_scale, scale_width, servo_columns
 from irb140_jax.mismatch.regression.tangent import Point, delayed, late
 from irb140_jax.recordings.low_pass import Band
@@ -80,6 +80,15 @@ def payload_columns(robot: Robot, along: Sequence[Prepared]) -> list[np.ndarray]
     return out
 
 
+def _low_passed(own: Features, j: int, band: Band, at: Point | None, dt: float) -> list[np.ndarray]:
+    """Blocks of a joint's features, as late as the log has its torque, through the low-pass window by window."""
+    parts = []
+    for window in row_windows(band, len(own.x), margin(at, dt)):
+        blocks = (late(at, x, np.full(x.shape[1], j), dt) for x in own.blocks(window.samples))
+        parts.append([window.low_passed(x, band) for x in blocks])
+    return [np.concatenate(x) for x in zip(*parts, strict=True)]
+
+
 def nuisances(
     robot: Robot,
     along: Sequence[Prepared],
@@ -129,9 +138,9 @@ def nuisances(
             fixed = np.concatenate([np.stack(fixed, axis=1), servo_columns(motion, j)], axis=1)
             fast = motion.qd[:, [j]] / scales.speed[j]  # levels of dry and viscous friction about a law's
             slope = np.concatenate([motion.direction[:, [j]] * own, fast * own], axis=1)
-            blocks = itertools.chain(features(motion, load, scales, j), [slope])
-            scaled = (late(at, x, np.full(x.shape[1], j), dt) for x in blocks)
-            joints.append([band.apply(b) for b in itertools.chain([fixed], scaled)])
+            slope = band.apply(late(at, slope, np.full(slope.shape[1], j), dt))
+            blocks = _low_passed(features(motion, load, scales, j), j, band, at, dt)
+            joints.append([band.apply(fixed), *blocks, slope])
         raw.append(joints)
     out: list[tuple[list[np.ndarray], list[np.ndarray]]] = [([], []) for _ in along]
     units, dry = [], []

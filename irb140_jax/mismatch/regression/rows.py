@@ -148,6 +148,11 @@ def row_windows(band: Band, samples: int, margin: int = 0, overlap: int = 0) -> 
         yield Window(rows, new, slice(max(first - margin, 0), min(last + margin, samples)), first)
 
 
+def margin(at: Point | None, dt: float) -> int:
+    """Samples on either side of a window that laws of the log look at."""
+    return int(np.ceil(MARGIN / dt)) if at and at.log else 0
+
+
 def candidate_rows(
     lib: Library, along: Prepared, index: int, band: Band, loads: Loads | None = None, at: Point | None = None,
     overlap: int = 0,
@@ -169,8 +174,7 @@ def candidate_rows(
     """
     recording, dt = along.recording, float(np.mean(np.diff(along.recording.t)))
     late = at if at and loads and at.log else None
-    margin = int(np.ceil(MARGIN / dt)) if late else 0
-    for window in row_windows(band, len(recording.t), margin, overlap):
+    for window in row_windows(band, len(recording.t), margin(late, dt), overlap):
         columns = columns_along(lib, along, loads, index, window.samples)
         endless = unbounded(lib, columns)
         columns = without(lib, columns, endless)
@@ -258,15 +262,13 @@ def _inertials(
     along: Prepared, band: Band, factor: np.ndarray, at: Point | None, dt: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Columns of the inertials as the model has them, and at a point, (R, n, 10 n) each."""
-    n, k = along.nominal.shape[1], len(factor)
-    margin = int(np.ceil(MARGIN / dt)) if at and at.log else 0
-    rigid, found = [], []
-    for window in row_windows(band, len(along.recording.t), margin):
-        upright = along.regressor_at(window.samples)
-        rigid.append(window.low_passed(upright, band) @ factor)
+    samples, n, k = len(along.recording.t), along.nominal.shape[1], len(factor)
+    rigid = np.empty((len(band.kept(samples)), n, k))
+    found = np.empty_like(rigid) if at else rigid
+    for window in row_windows(band, samples, margin(at, dt)):
+        rigid[window.rows] = window.low_passed(along.regressor_at(window.samples), band) @ factor
         if at:
             Y = regressor(at, along, window.samples)
             Y = logged(at, Y.reshape(len(Y), -1), np.repeat(np.arange(n), k), dt).reshape(Y.shape)
-            found.append(window.low_passed(Y, band) @ factor)
-    whole = np.concatenate(rigid)
-    return whole, np.concatenate(found) if at else whole
+            found[window.rows] = window.low_passed(Y, band) @ factor
+    return rigid, found
