@@ -55,7 +55,7 @@ NOT_ON_THIS_MACHINE = {
 # A hinge and two slides feel forces in two directions of space only.
 UNSEEN = {"external_wrench": {"force_z"}, "contact": {"stiffness", "normal_x", "normal_y", "normal_z", "position"}}
 SHARE = 0.15  # of the joint's torque
-SHARES = {"torque_gain": 0.2}  # 15 % is little more than what constants are usually off by
+SHARES = {"torque_gain": 0.2}  # 15 % is little more than constants are usually off by, and not named (decision 30)
 
 
 def machine(

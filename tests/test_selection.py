@@ -340,10 +340,11 @@ def test_what_a_search_holds_is_in_every_set_it_returns():
 def test_ordinary_friction_is_stated_where_one_rare_effect_explains_nearly_as_much():
     """A wrong torque constant and a discrepancy like friction may be nearly as probable as friction itself."""
     space, _ = planted(2, {})
-    friction, rare = (0, 1), (2,)
-    hyper = ((0,) * len(SETTING),) * 2
-    assert named(space, friction, hyper, {frozenset(friction): 0.0, frozenset(rare): -1.9}) == (friction, hyper)
-    assert named(space, rare, hyper, {frozenset(rare): 0.0, frozenset((*rare, 3)): -1.9}) == (rare, hyper)
+    friction, offset, rotor = (0, 1), (2,), (0, 3)
+    hyper = (SETTING,) * 2
+    stated = lambda best, other: named(space, best, hyper, {frozenset(best): 0.0, frozenset(other): -1.9})[0]  # noqa: E731
+    assert stated(friction, offset) == friction and stated(offset, friction) == friction
+    assert stated(rotor, offset) == offset and stated(offset, rotor) == offset  # one rare effect each
 
 
 def test_amplitudes_that_are_not_admissible_make_a_set_impossible():

@@ -75,15 +75,17 @@ class Discrepancy:
 
 @dataclasses.dataclass(frozen=True)
 class Features:
-    """The four blocks of one joint's features along a recording, of some samples at a time: of an hour all fill a GB.
+    """What the features of one joint are made of along a recording.
+
+    The features themselves are made for some samples at a time: of a long recording all of them fill the memory.
 
     Attributes:
         x: Position in its range, from -1 to 1, shape (T,).
         qd: Velocity [rad/s or m/s], shape (T,).
         direction: Of the motion, shape (T,).
         carried: Torque that the transmission carries over the joint's usual one, shape (T,).
-        bend: How much of the square of `carried` is what goes in proportion to it, along this recording.
-        turning: What happens around reversals, whatever the load, shape (T, 10).
+        bend: Slope of the line through zero that is nearest to the square of `carried` over its size.
+        turning: Features of what happens around reversals, whatever the load, shape (T, 10).
         pushed: Size of the acceleration over its RMS, shape (T,).
         top: The joint's top speed [rad/s or m/s].
     """
@@ -98,7 +100,7 @@ class Features:
     top: float
 
     def blocks(self, at: slice = slice(None)) -> list[np.ndarray]:
-        """The blocks at some samples, each (t, features)."""
+        """The four blocks of features at some samples, each (t, features): position, speed, smooth, reversal."""
         direction = self.direction[at, None]
         position = np.polynomial.chebyshev.chebvander(self.x[at], ORDERS)[:, 1:]
         fast = 1.0 + 2.0 * np.log(np.abs(self.qd[at]) / self.top + 1e-3) / np.log(1e3)
@@ -112,7 +114,7 @@ class Features:
 
 
 def features(r: Conditioned, load: np.ndarray, scales: Scales, j: int) -> Features:
-    """The features of one joint.
+    """What the features of one joint are made of.
 
     Args:
         r: T samples of n joints.

@@ -149,7 +149,7 @@ def row_windows(band: Band, samples: int, margin: int = 0, overlap: int = 0) -> 
 
 
 def margin(at: Point | None, dt: float) -> int:
-    """Samples on either side of a window that laws of the log look at."""
+    """Samples [dt s apart] on either side of a window that the laws of the log at a point look at."""
     return int(np.ceil(MARGIN / dt)) if at and at.log else 0
 
 

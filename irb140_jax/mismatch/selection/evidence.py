@@ -167,8 +167,8 @@ class Space:
         return known + float(np.logaddexp.reduce(by_width, axis=None)) + self._of_truncated(chosen, H, hyper)
 
     def _of_truncated(self, chosen: Sequence[int], H: np.ndarray, hyper: Hyper) -> float:
-        """What it adds to the log evidence that the first of tied columns, a mass, is not below zero."""
-        if not (at := self._first_tied(chosen)).size:
+        """What it adds to the log evidence that masses are not below zero."""
+        if not (at := self._masses(chosen)).size:
             return 0.0
         prior = self.prior(chosen, hyper)
         chol = root(with_prior(H[:-1, :-1] * np.outer(prior, prior)))
@@ -189,11 +189,10 @@ class Space:
         of_members = [np.full(len(self.columns[c]), self.candidates[c].effect.prior.tied) for c in chosen]
         return np.concatenate([np.zeros(self.offset, dtype=bool), *of_members])
 
-    def _first_tied(self, chosen: Sequence[int]) -> np.ndarray:
-        """Where a set's columns have the first of each member's tied ones."""
-        tied = self._tied(chosen)
+    def _masses(self, chosen: Sequence[int]) -> np.ndarray:
+        """Which of a set's columns are masses that are not below zero: the first of their members'."""
         starts = self.offset + np.cumsum([0, *(len(self.columns[c]) for c in chosen)], dtype=int)[:-1]
-        return np.array([s for s, c in zip(starts, chosen, strict=True) if tied[s] and self._is_mass(c)], dtype=int)
+        return np.array([s for s, c in zip(starts, chosen, strict=True) if self._is_mass(c)], dtype=int)
 
     def _is_mass(self, candidate: int) -> bool:
         return self.candidates[candidate].effect.prior.is_mass
@@ -267,7 +266,7 @@ class Space:
         found = posterior(np.pad(H[np.ix_(at, at)], (0, 1)) + np.pad(H[at, -1:], ((0, 1), (len(at), 0))),
                           np.arange(len(at)), named, self.prior(chosen, hyper)[at])  # fmt: skip
         mean[at], cov[np.ix_(at, at)] = found.mean, found.cov
-        for first in self._first_tied(chosen):
+        for first in self._masses(chosen):
             mean, cov = truncated(mean, cov, int(first))
         return mean, cov
 
@@ -337,7 +336,7 @@ class Space:
     def outside(self, which: np.ndarray, mean: np.ndarray) -> np.ndarray:
         """Which candidates' amplitudes (candidates, k) are inadmissible."""
         k = mean.shape[1]
-        # Tied ones may seem impossible by what is not known of them: their bound is in the evidence.  What moves
+        # A mass may seem impossible by what is not known of its width: its bound is in the evidence.  What moves
         # nothing has an infinite one.
         mass = np.array([self._is_mass(i) for i in which], dtype=bool)
         lowest = self.lowest[which, :k]

@@ -39,8 +39,8 @@ def selected(
 def named(space: Space, best: tuple[int, ...], hyper: Hyper, sets: Sets) -> tuple[tuple[int, ...], Hyper]:
     """What is stated: the members of a set that are probable together with what may stand in their place.
 
-    Of sets that can't be told from the best one it is that with the fewest effects that few robots have, and of those
-    that with the fewest members: two names for what may be one need the odds for it, ordinary friction needs none.
+    Of sets that can't be told from the best one it is that with the fewest members beside ordinary friction, and of
+    those that with the fewest in all: two names for what may be one need the odds for it, ordinary friction needs none.
 
     Args:
         space: What may be in a set.
@@ -54,8 +54,8 @@ def named(space: Space, best: tuple[int, ...], hyper: Hyper, sets: Sets) -> tupl
     top, least = frozenset(best), sets[frozenset(best)] - np.log(settings.NAMED / (1.0 - settings.NAMED))
     # Whether one of its own members may be missing is for that member's probability to say.
     even = [s for s, value in sets.items() if value > least and not s < top]
-    rare = lambda s: sum(not space.candidates[i].effect.prior.ordinary for i in s)  # noqa: E731
-    few = tuple(sorted(min(even, key=lambda s: (rare(s), len(s), -sets[s]))))
+    beside = lambda s: sum(not space.candidates[i].effect.prior.ordinary for i in s)  # noqa: E731
+    few = tuple(sorted(min(even, key=lambda s: (beside(s), len(s), -sets[s]))))
     sure = tuple(i for i in few if in_its_place(space.candidates, sets, few, i)[1] >= settings.NAMED)
     return sure, hyper if sure == best else settled(space, sure, hyper)[1]
 

@@ -55,8 +55,11 @@ def added_by_tied(M: np.ndarray, rhs: np.ndarray, is_mass: bool) -> tuple[float,
     """Log evidence that tied columns add over all widths of their prior, and their mean at the most probable one.
 
     Args:
-        M, rhs: 1 + X'X and X'y in prior units.
-        is_mass: Whether the first is not below zero; its mean is then not told.
+        M, rhs: 1 + X'X, shape (k, k), and X'y, shape (k,), of the columns X in units of the stated prior.
+        is_mass: Whether the first is not below zero.
+
+    Returns:
+        The log evidence, and the mean, shape (k,): zero where the first is a mass, which no bound rules out then.
     """
     size, axes = np.linalg.eigh(M - np.eye(len(M)))
     over, along = np.outer(WIDTHS**2, np.maximum(size, 0.0)), WIDTHS[:, None] * (axes.T @ rhs)
@@ -71,7 +74,7 @@ def added_by_tied(M: np.ndarray, rhs: np.ndarray, is_mass: bool) -> tuple[float,
 
 
 def above_zero(mean: np.ndarray, std: np.ndarray) -> np.ndarray:
-    """Log of the probability that what is not below zero a priori isn't so by the data, over the prior's half."""
+    """Log of the probability by mean and standard deviation, (k,) each, of being above zero, over the prior's half."""
     return special.log_ndtr(mean / std) + np.log(2.0)
 
 
