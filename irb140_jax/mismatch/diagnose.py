@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from irb140_jax.allocator import give_back
 from irb140_jax.compilation_cache import make_room_for_programs
 from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import CATALOGUE
@@ -121,7 +122,17 @@ def diagnose(
     make_room_for_programs()  # hundreds of robots in one process would crash it
     # Thousands of small solves: a second BLAS thread costs more in waking up than it does.
     with threadpool_limits(1, "blas"):
-        return _diagnosed(robot, recordings, config or DiagnoseConfig(), progress)
+        return _diagnosed(robot, recordings, config or DiagnoseConfig(), _giving_back(progress))
+
+
+def _giving_back(progress: Callable[[str], None]) -> Callable[[str], None]:
+    """What is told of each stage, after memory that the last one left free was given back."""
+
+    def told(stage: str) -> None:
+        give_back()
+        progress(stage)
+
+    return told
 
 
 def _diagnosed(
