@@ -8,7 +8,7 @@ from irb140_jax.effects import At
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.records import digits
 from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
-from irb140_jax.mismatch.regression.nuisances import FIXED, SCALED
+from irb140_jax.mismatch.regression.nuisances import SCALED
 from irb140_jax.mismatch.regression.sufficient_data import Comparison, mostly_lost
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.held_out import HeldOut
@@ -18,7 +18,6 @@ from irb140_jax.robot import Robot
 FRICTION_LEVELS = SCALED.index("slope")  # friction of each recording about the mean over all
 # What each block of the discrepancy depends on, in the order of `SCALED`.
 GOES_WITH = ("its position", "its speed", "its position, speed and load together", "what it does around reversals")
-DELAY = FIXED.index("delay")
 
 
 def notes(data: Comparison, uncertainty: float, judged: np.ndarray) -> list[str]:
@@ -153,15 +152,15 @@ def timing_notes(ex: Explanation) -> list[str]:
     any rare effect.
     """
     space, named = ex.space, {j for c in ex.members if c.effect.place.at is At.LOG_TIMING for j in c.joints}
-    of_all, of_one = settings.DELAY_COMMON, settings.DELAY_JOINT
-    shared = np.zeros((1, len(space.set_columns(ex.chosen))))
-    shared[0, space.inertials + 1] = of_all
+    mean, cov = space.posterior(ex.chosen, ex.hyper)
+    at = np.arange(space.offset - space.delays, space.offset)
+    of_all, of_one = settings.DELAY_COMMON, settings.DELAY_JOINT * space.prior(ex.chosen, ex.hyper)[at]
+    weights = np.zeros((len(at), len(mean)))
+    weights[:, space.inertials + 1] = of_all
+    weights[np.arange(len(at)), at] = settings.DELAY_JOINT
     off = []
-    for j, gram in enumerate(space.joints):
-        own = of_one * (np.arange(len(gram.groups)) == DELAY)[None]
-        mean, cov = space.functions(ex.chosen, ex.hyper, j, shared, own)
-        early, unsure = float(mean[0]), float(np.sqrt(cov[0, 0]))
-        odds = log_odds_of_any(early, unsure, float(np.hypot(of_all, of_one))) + np.log(settings.RARE)
+    for j, (early, unsure) in enumerate(zip(weights @ mean, np.sqrt(np.diag(weights @ cov @ weights.T)), strict=True)):
+        odds = log_odds_of_any(early, unsure, float(np.hypot(of_all, of_one[j]))) + np.log(settings.RARE)
         if j not in named and odds > 0.0 and abs(early) > settings.NOTABLE_DELAY:
             way = "early" if early > 0.0 else "late"
             # To one digit: of a shift in time, the fit knows the slope of the torque alone.

@@ -67,13 +67,20 @@ def _grams_of_joint(
     return np.append(active, len(columns)), np.stack(out)
 
 
-def with_prior(G: np.ndarray) -> np.ndarray:
-    """Gram matrices (..., k, k) of amplitudes with their unit prior; far beyond it, what rounding leaves of them."""
-    return G + np.eye(G.shape[-1]) * (1.0 + ROUNDING * np.diagonal(G, axis1=-2, axis2=-1))[..., None]
+def with_prior(G: np.ndarray, columns: int | None = None) -> np.ndarray:
+    """Gram matrices (..., k, k) of amplitudes with their unit prior; far beyond it, what rounding leaves of them.
+
+    Args:
+        G: The Gram matrices.
+        columns: How many of the first columns are amplitudes that data may say that much of; all by default.
+    """
+    far = ROUNDING * np.diagonal(G, axis1=-2, axis2=-1)
+    far = np.where(np.arange(G.shape[-1]) < (G.shape[-1] if columns is None else columns), far, 0.0)
+    return G + np.eye(G.shape[-1]) * (1.0 + far)[..., None]
 
 
 def root(M: np.ndarray) -> np.ndarray:
-    """Lower triangular L with L L' = M, of a Gram matrix with its prior, which has no eigenvalue below 1.
+    """Lower triangular L with L L' = M, (..., k, k), of Gram matrices with their prior: no eigenvalue is below 1.
 
     Where rounding leaves one below zero, as scales of many orders of magnitude can, it counts as 1.
     """
@@ -81,16 +88,8 @@ def root(M: np.ndarray) -> np.ndarray:
         return np.linalg.cholesky(M)
     except np.linalg.LinAlgError:
         values, vectors = np.linalg.eigh(M)
-        _, R = np.linalg.qr(np.sqrt(np.maximum(values, 1.0))[:, None] * vectors.T)
-        return (R * np.sign(np.diag(R))[:, None]).T
-
-
-def cholesky_diagonals(M: np.ndarray) -> np.ndarray:
-    """Diagonals of the Cholesky factors of matrices (b, k, k), shape (b, k)."""
-    try:
-        return np.diagonal(np.linalg.cholesky(M), axis1=1, axis2=2)
-    except np.linalg.LinAlgError:
-        return np.array([np.diag(root(m)) for m in M])
+        _, R = np.linalg.qr(np.sqrt(np.maximum(values, 1.0))[..., :, None] * np.swapaxes(vectors, -2, -1))
+        return np.swapaxes(R * np.sign(np.diagonal(R, axis1=-2, axis2=-1))[..., :, None], -2, -1)
 
 
 def eliminated(H: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, float]:

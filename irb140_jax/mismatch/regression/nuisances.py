@@ -17,7 +17,7 @@ from irb140_jax.recordings.payload import distinct, inertials_per_metre
 from irb140_jax.robot import Robot
 
 # A joint's own columns with stated widths, in their order; those of a servo come after them.
-FIXED = ("gain", "delay", "rotor", "smoothing", "bias")
+FIXED = ("gain", "rotor", "smoothing", "bias")
 DRIVE_KD, COMMAND_DELAY = (len(FIXED) + NAMES.index(name) for name in ("kd", "command"))  # of servos, after those
 COMMON = 3  # nuisance parameters that all joints share, beside those of servos
 # Groups of columns with stated widths: errors of the instrument, and those of a servo's drive, which models hold.
@@ -33,8 +33,8 @@ class Nuisances:
     """Columns of one recording beside inertials and effects, low-passed rows as in `Stretch`, in prior units.
 
     Attributes:
-        common: Torque scale, delay and smoothing of all joints, `COMMON` of them; where known payloads sit; and of
-            servos the times of commands: those of `common_columns`; shape (R, n, C).
+        common: Torque scale, delay and smoothing of all joints, `COMMON` of them; where known payloads sit; and each
+            joint's own delay, or of servos the times of commands: those of `common_columns`; shape (R, n, C).
         own: Of each joint, fixed widths first, then the blocks `SCALED`; shape (R, D_j) each.
         groups: Which block each own column belongs to: `INSTRUMENT`, `DRIVE` or an index into `SCALED`; (D_j,) each.
         units: What each own column's feature was multiplied by, shape (D_j,) each.
@@ -120,8 +120,6 @@ def nuisances(
         # What each recording has beside the mean of all; of one recording there is nothing beside it.
         own = (np.arange(count) == r) - 1.0 / count if count > 1 else np.zeros(0)
         early = motion.servo.lag_width if motion.servo else settings.DELAY_COMMON
-        # Of a servo's torque, which is made of commands and positions, each joint's commands have a time of their own.
-        own_delay = 0.0 if motion.servo else settings.DELAY_JOINT
         bend = settings.SMOOTHED * np.gradient(np.gradient(total, dt, axis=0), dt, axis=0)
         rotor = settings.ROTOR_ERROR * np.asarray(robot.armature) * motion.qdd
         bias = settings.BIAS * scales.torque * (1.0 - np.abs(motion.direction))
@@ -129,12 +127,16 @@ def nuisances(
         held = [late(at, x, np.arange(n), dt)[..., None] for x in np.moveaxis(placed[r], -1, 0)]
         gain = gain + damping_of_scale(motion)
         common = np.stack([settings.GAIN_COMMON * gain, early * rate, 2.0 * bend], axis=-1)
-        commons.append(band.apply(np.concatenate([common, *held, common_columns(motion, own)], axis=-1)))
+        common = band.apply(np.concatenate([common, *held, common_columns(motion, own)], axis=-1))
+        if motion.servo is None:
+            of_one = settings.DELAY_JOINT / settings.DELAY_COMMON * common[:, :, 1]
+            common = np.concatenate([common, of_one[:, :, None] * np.eye(n)], axis=-1)
+        commons.append(common)
         joints = []
         turned.append(band.apply(late(at, motion.direction, np.arange(n), dt)))
         for j in range(n):
             wide = np.hypot(settings.GAIN_JOINT, scale_width(motion, j))
-            fixed = (wide * gain[:, j], own_delay * rate[:, j], rotor[:, j], bend[:, j], bias[:, j])
+            fixed = (wide * gain[:, j], rotor[:, j], bend[:, j], bias[:, j])
             fixed = np.concatenate([np.stack(fixed, axis=1), servo_columns(motion, j)], axis=1)
             fast = motion.qd[:, [j]] / scales.speed[j]  # levels of dry and viscous friction about a law's
             slope = np.concatenate([motion.direction[:, [j]] * own, fast * own], axis=1)

@@ -37,6 +37,8 @@ class Space:
             (2, candidates): see `regression.silent`.
         centre: Prior means of the common nuisances in prior units, shape (offset - inertials,): not zero where rows
             were made with some of them.
+        delays: How many of the common nuisances, the last ones, are delays of one joint each: as their prior's width is
+            one for all of them and not known, late channels make others that are late more probable.
     """
 
     joints: tuple[JointGram, ...]
@@ -52,6 +54,7 @@ class Space:
     least: np.ndarray
     silent: np.ndarray
     centre: np.ndarray
+    delays: int = 0
 
     @cached_property
     def beside(self) -> Beside:
@@ -179,10 +182,16 @@ class Space:
         """Gram matrix of a set's columns and y, and log evidence and prior by `evidences_by_width`."""
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(hyper, every, every)
-        by_width = evidences_by_width(H, self.inertials, self._tied(chosen))
+        by_width = evidences_by_width(H, self._of_unknown_width(chosen))
         best = np.unravel_index(np.argmax(by_width), by_width.shape)
-        self._widths[tuple(sorted(chosen)), hyper] = float(WIDTHS[best[0]]), float(WIDTHS[best[1]])
+        self._widths[tuple(sorted(chosen)), hyper] = WIDTHS[list(best)]
         return H, by_width
+
+    def _of_unknown_width(self, chosen: Sequence[int]) -> np.ndarray:
+        """Which of a set's columns have priors of one width each that is not known, shape (3, k)."""
+        of_inertials, of_delays = np.zeros((2, self.offset + sum(len(self.columns[c]) for c in chosen)), dtype=bool)
+        of_inertials[: self.inertials] = of_delays[self.offset - self.delays : self.offset] = True
+        return np.stack([of_inertials, of_delays, self._tied(chosen)])
 
     def _tied(self, chosen: Sequence[int]) -> np.ndarray:
         """Which of a set's columns have one prior whose width is not known, shape (k,)."""
@@ -199,34 +208,32 @@ class Space:
 
     def width(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """True over stated error of the inertials that is most probable beside a set."""
-        return self._most_probable_widths(chosen, hyper)[0]
+        return float(self._most_probable_widths(chosen, hyper)[0])
 
-    def _most_probable_widths(self, chosen: Sequence[int], hyper: Hyper) -> tuple[float, float]:
-        """Widths of the inertials' prior and of the set's tied columns, over those stated."""
+    def _most_probable_widths(self, chosen: Sequence[int], hyper: Hyper) -> np.ndarray:
+        """Widths of the priors of inertials, delays and the set's tied columns over those stated, shape (3,)."""
         key = tuple(sorted(chosen)), hyper
         if key not in self._widths:
             self._by_width(chosen, hyper)
         return self._widths[key]
 
     @cached_property
-    def _widths(self) -> dict[tuple, tuple[float, float]]:
+    def _widths(self) -> dict[tuple, np.ndarray]:
         return {}
 
     def prior(self, chosen: Sequence[int], hyper: Hyper) -> np.ndarray:
         """Prior standard deviations of a set's columns, in units of those that were stated."""
-        of_inertials, of_tied = self._most_probable_widths(chosen, hyper)
-        out = np.where(self._tied(chosen), of_tied, 1.0)
-        out[: self.inertials] = of_inertials
-        return out
+        unknown = self._of_unknown_width(chosen)
+        return np.where(unknown.any(axis=0), self._most_probable_widths(chosen, hyper) @ unknown, 1.0)
 
     def torque_scale_odds(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """Log evidence for one scale of all torques, the first of the common nuisances, over that of none."""
         every = self.with_y(self.set_columns(chosen))
         H = self.gram(hyper, every, every)
-        tied = self._tied(chosen)
+        unknown = self._of_unknown_width(chosen)
         without = np.delete(np.delete(H, self.inertials, axis=0), self.inertials, axis=1)
-        free = evidences_by_width(H, self.inertials, tied)
-        none = evidences_by_width(without, self.inertials, np.delete(tied, self.inertials))
+        free = evidences_by_width(H, unknown)
+        none = evidences_by_width(without, np.delete(unknown, self.inertials, axis=1))
         return float(np.logaddexp.reduce(free, axis=None) - np.logaddexp.reduce(none, axis=None))
 
     def lost(self, which: Sequence[int] | np.ndarray, hyper: Hyper) -> np.ndarray:

@@ -182,7 +182,8 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     joints = joint_grams(sums, lib, data, extra, noise, given.sensors)
     del sums  # hundreds of megabytes, before the search
     first = of_kinds(given.first, lib.effects)
-    space = space_of(joints, data, extra[0].common.shape[-1], lib, first, settled=turn > 1)
+    delays = 0 if given.drive else lib.robot.n
+    space = space_of(joints, data, extra[0].common.shape[-1], lib, first, delays=delays, settled=turn > 1)
     silent = silent_rows(data.candidates, [r.recording for r in start.along], joints, noise)
     space = dataclasses.replace(space, centre=_centre(space, given.drive, start), silent=silent)
     sites = [site_of(c) for c in data.candidates]

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import linalg, special
 
 from irb140_jax.mismatch import settings
-from irb140_jax.mismatch.regression.gaussian import cholesky_diagonals, root, with_prior
+from irb140_jax.mismatch.regression.gaussian import root, with_prior
 from irb140_jax.mismatch.regression.gram import LEVELS, JointHyper
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.screening import gains
@@ -69,7 +69,7 @@ def _climbed(space: Space, chosen: Sequence[int], hyper: Hyper, j: int, prior: n
     def values(tries: list[JointHyper]) -> None:
         if new := [s for s in tries if s not in known]:
             own = scale[:, None] * np.stack([gram.left(s, take) for s in new]) * scale
-            diagonal = cholesky_diagonals(rest + own)
+            diagonal = np.diagonal(root(rest + own), axis1=1, axis2=2)
             value = 0.5 * (own[:, -1, -1] - diagonal[:, -1] ** 2) - np.log(diagonal[:, :-1]).sum(axis=1)
             lost = [space.lost(here, (*hyper[:j], s, *hyper[j + 1 :])).sum() for s in new]
             known.update(zip(new, value + [gram.at(s).constant for s in new] - lost, strict=True))

@@ -14,8 +14,9 @@ from irb140_jax.mismatch.selection.kinds import kinds_of
 
 
 def space_of(
-    joints: tuple[JointGram, ...], data: Data, common: int, lib: Library, first: Library, *, settled: bool = True
-) -> Space:
+    joints: tuple[JointGram, ...], data: Data, common: int, lib: Library, first: Library, *, delays: int = 0,
+    settled: bool = True,
+) -> Space:  # fmt: skip
     """Gram matrices of every joint, with the prior probability and the bounds of every candidate.
 
     Args:
@@ -24,6 +25,7 @@ def space_of(
         common: Number of nuisance parameters that all joints share.
         lib: The library.
         first: The library before its shapes were refined: what was to be expected of them.
+        delays: How many of those nuisances, the last ones, are delays of one joint each.
         settled: Whether the grids of shapes have been refined.
     """
     candidates = data.candidates
@@ -51,7 +53,7 @@ def space_of(
     return Space(
         joints, candidates, data.nuisances, data.nuisances + common, len(data.scale) + common,
         log_prior(data, lib, first), kinds_of(candidates, settings.RARE), lowest, highest, weights, least,
-        np.zeros((2, len(candidates))), np.zeros(common),
+        np.zeros((2, len(candidates))), np.zeros(common), delays,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Columns whose prior has a width that nobody knows: the inertials', and those of effects that are `tied`.
+"""Columns whose prior has a width that nobody knows: inertials, delays of channels, and effects that are `tied`.
 
 The evidence is a sum over widths about the one that was stated.
 """
@@ -7,48 +7,38 @@ import numpy as np
 from scipy import special
 
 from irb140_jax.mismatch import settings
-from irb140_jax.mismatch.regression.gaussian import cholesky_diagonals, root, with_prior
+from irb140_jax.mismatch.regression.gaussian import root, with_prior
 
 WIDTHS = 2.0**settings.WIDTH_OCTAVES  # of a prior over the one that was stated
 _FALL = -np.log1p(settings.WIDTH_OCTAVES**2)
 LOG_PRIOR = _FALL - special.logsumexp(_FALL)  # a Cauchy distribution over octaves, cut off
 
 
-def evidences_by_width(H: np.ndarray, inertials: int, tied: np.ndarray) -> np.ndarray:
-    """Log evidence and prior of each width of the inertials' prior and of that of tied columns, (WIDTHS, WIDTHS or 1).
+def evidences_by_width(H: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+    """Log evidence and prior of each width of each prior whose width is not known, shape (WIDTHS, ...).
 
     Args:
-        H: Gram matrix of the inertials, then of other columns, then y.
-        inertials: How many inertials there are.
-        tied: Which of the columns are tied.
+        H: Gram matrix of columns and y, which comes last, shape (k + 1, k + 1).
+        unknown: Which columns have the first of these priors, which the second and so on, shape (priors, k).  Of a
+            prior that no column has one width stands for all.
     """
-    order = np.append(np.argsort(tied, kind="stable"), len(tied))
-    scale = np.ones((len(WIDTHS), len(H)))
-    scale[:, :inertials] = WIDTHS[:, None]
-    M = with_prior(H[np.ix_(order, order)] * (scale[:, :, None] * scale[:, None, :]))
-    k = int(np.count_nonzero(tied))
-    if not k:
-        return (_log_evidences(M) + LOG_PRIOR)[:, None]
-    # What is left of the tied columns and y beside all others is the same at each of their widths.
-    L = np.array([root(m) for m in M])
-    free = len(tied) - k
-    left = L[:, free:, free:] @ L[:, free:, free:].swapaxes(1, 2)
-    explained = M[:, -1, -1] - left[:, -1, -1]
-    by_inertials = LOG_PRIOR + 0.5 * explained - np.log(L[:, range(free), range(free)]).sum(axis=1)
-    left = left - np.eye(k + 1)
-    scales = np.pad(np.repeat(WIDTHS[:, None], k, axis=1), ((0, 0), (0, 1)), constant_values=1.0)
-    by_tied = [_log_evidences(with_prior(left * np.outer(s, s))) for s in scales]
-    return by_inertials[:, None] + np.transpose(by_tied) + LOG_PRIOR
-
-
-def _log_evidences(M: np.ndarray) -> np.ndarray:
-    """Log evidence of amplitudes from Gram matrices with their prior (b, k + 1, k + 1) whose last column is y, (b,).
-
-    The last pivot of a Cholesky factor that has y in it is what is left of y.
-    """
-    diagonal = cholesky_diagonals(M)
-    explained = M[:, -1, -1] - diagonal[:, -1] ** 2
-    return 0.5 * explained - np.log(diagonal[:, :-1]).sum(axis=1)
+    known = np.flatnonzero(~unknown.any(axis=0))
+    groups = [known, *map(np.flatnonzero, unknown)]
+    order = np.concatenate([*groups, [len(H) - 1]])
+    left, value = H[np.ix_(order, order)], np.zeros(())
+    for number, group in enumerate(groups):
+        k = len(group)
+        if number:
+            scale = np.ones((len(WIDTHS) if k else 1, left.shape[-1]))
+            scale[:, :k] = WIDTHS[:, None] if k else 1.0
+            left = left[..., None, :, :] * (scale[:, :, None] * scale[:, None, :])
+            value = value[..., None] + (LOG_PRIOR if k else 0.0)
+        # The others get a prior, too, so that rounding leaves a root, and lose it again.
+        L = root(with_prior(left, k))
+        value = value - np.log(np.diagonal(L, axis1=-2, axis2=-1)[..., :k]).sum(axis=-1)
+        rest = L[..., k:, k:]
+        left = rest @ np.swapaxes(rest, -2, -1) - np.eye(rest.shape[-1])
+    return value + 0.5 * (H[-1, -1] - left[..., 0, 0])
 
 
 def added_by_tied(M: np.ndarray, rhs: np.ndarray, is_mass: bool) -> tuple[float, np.ndarray]:
