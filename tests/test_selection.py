@@ -72,11 +72,13 @@ def with_payload(space: Space) -> Space:
 
 
 def density(
-    space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], hyper, width: float, tied: float = 1.0
-) -> float:
+    space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], hyper, width: float, tied: float = 1.0,
+    common: float = 1.0,
+) -> float:  # fmt: skip
     """Log density of both joints' torque with every unknown integrated out by its covariance: no Gram matrices.
 
-    The inertials' prior is as many times as wide as stated as `width` says, a payload's as `tied` does.
+    The inertials' prior is as many times as wide as stated as `width` says, a payload's as `tied` does, that of common
+    nuisances as `common` does.
     """
     columns = space.set_columns(chosen)
     shared, blocks = [], []
@@ -84,6 +86,7 @@ def density(
         wide = np.zeros((ROWS, space.size))
         wide[:, d["mine"]] = d["X"]
         wide[:, :INERTIALS] *= width
+        wide[:, INERTIALS : INERTIALS + COMMON] *= common
         for c in (space.candidates[i] for i in chosen if space.candidates[i].slug == "payload"):
             wide[:, c.columns + space.offset] *= tied
         shared.append(wide[:, columns])
@@ -157,6 +160,24 @@ def test_a_payload_is_as_probable_as_its_data_over_all_widths_of_its_prior_with_
         scale = np.sqrt(np.diag(cov))
         np.testing.assert_allclose(found / scale, drawn.mean(axis=0) / scale, atol=0.01)
         np.testing.assert_allclose(spread / np.outer(scale, scale), np.cov(drawn.T) / np.outer(scale, scale), atol=0.01)
+
+
+def test_a_set_is_as_probable_as_its_data_over_all_widths_of_the_priors_of_inertials_delays_and_a_payload():
+    space, data = planted(2, {0: 6.0, 4: -4.0})
+    space, hyper, chosen = dataclasses.replace(with_payload(space), delays=COMMON), (SETTING, SETTING), (0, 2)
+    each = np.zeros((len(WIDTHS),) * 3)
+    for at in np.ndindex(each.shape):
+        of_inertials, of_delays, of_payload = WIDTHS[list(at)]
+        each[at] = density(space, data, chosen, hyper, of_inertials, of_payload, of_delays) + LOG_PRIOR[list(at)].sum()
+    of_inertials, of_delays, of_payload = WIDTHS[list(np.unravel_index(np.argmax(each), each.shape))]
+    prior = np.r_[np.full(INERTIALS, of_inertials), of_delays, of_payload, of_payload, 1.0]
+    np.testing.assert_array_equal(space.prior(chosen, hyper), prior)
+    mean, cov = dense_posterior(space, data, chosen, hyper, prior)
+    mass = INERTIALS + COMMON
+    above = np.log(2.0 * stats.norm.cdf(mean[mass], 0.0, np.sqrt(cov[mass, mass])))
+    constant = sum(log_prior_of_sizes()[list(own[:-1])].sum() for own in hyper)
+    evidence = np.logaddexp.reduce(each, axis=None) + above + constant + 2.0 * np.log(0.05)
+    assert space.log_evidence(chosen, hyper) == pytest.approx(evidence, abs=1e-8)
 
 
 def test_a_payload_whose_mass_moves_nothing_is_not_found():

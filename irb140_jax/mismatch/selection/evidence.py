@@ -72,7 +72,7 @@ class Space:
         Beside what `Beside` says: one law a joint holds its level of dry friction, and one shifts its log in time.
         """
         out = self.beside.conflicts(chosen)
-        for alike in (self._dry, self._late):
+        for alike in (self._dry, self.late):
             taken = np.any(self.at_joint[:, list(chosen)] & alike[list(chosen)], axis=1)
             out = out | (alike & np.any(self.at_joint & taken.reshape(-1, 1), axis=0))
         return out
@@ -95,7 +95,8 @@ class Space:
         return np.array([DRY == c.slug or DRY in c.effect.law.contains for c in self.candidates], dtype=bool)
 
     @cached_property
-    def _late(self) -> np.ndarray:
+    def late(self) -> np.ndarray:
+        """Which candidates shift the log in time, shape (candidates,)."""
         return np.array([c.effect.place.at is At.LOG_TIMING for c in self.candidates])
 
     @cached_property
@@ -184,7 +185,9 @@ class Space:
         H = self.gram(hyper, every, every)
         by_width = evidences_by_width(H, self._of_unknown_width(chosen))
         best = np.unravel_index(np.argmax(by_width), by_width.shape)
-        self._widths[tuple(sorted(chosen)), hyper] = WIDTHS[list(best)]
+        of_delays = np.logaddexp.reduce(by_width, axis=(0, 2))
+        of_delays = np.resize(of_delays - np.logaddexp.reduce(of_delays), len(WIDTHS))
+        self._widths[tuple(sorted(chosen)), hyper] = WIDTHS[list(best)], of_delays
         return H, by_width
 
     def _of_unknown_width(self, chosen: Sequence[int]) -> np.ndarray:
@@ -208,23 +211,36 @@ class Space:
 
     def width(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """True over stated error of the inertials that is most probable beside a set."""
-        return float(self._most_probable_widths(chosen, hyper)[0])
+        return float(self._of_widths(chosen, hyper)[0][0])
 
-    def _most_probable_widths(self, chosen: Sequence[int], hyper: Hyper) -> np.ndarray:
-        """Widths of the priors of inertials, delays and the set's tied columns over those stated, shape (3,)."""
+    def _of_widths(self, chosen: Sequence[int], hyper: Hyper) -> tuple[np.ndarray, np.ndarray]:
+        """The most probable widths of the priors of inertials, delays and tied columns over those stated, shape (3,).
+
+        Beside them the log probability of each width of the delays' prior, shape (WIDTHS,).
+        """
         key = tuple(sorted(chosen)), hyper
         if key not in self._widths:
             self._by_width(chosen, hyper)
         return self._widths[key]
 
     @cached_property
-    def _widths(self) -> dict[tuple, np.ndarray]:
+    def _widths(self) -> dict[tuple, tuple[np.ndarray, np.ndarray]]:
         return {}
 
     def prior(self, chosen: Sequence[int], hyper: Hyper) -> np.ndarray:
         """Prior standard deviations of a set's columns, in units of those that were stated."""
         unknown = self._of_unknown_width(chosen)
-        return np.where(unknown.any(axis=0), self._most_probable_widths(chosen, hyper) @ unknown, 1.0)
+        return np.where(unknown.any(axis=0), self._of_widths(chosen, hyper)[0] @ unknown, 1.0)
+
+    def priors_by_delays(self, chosen: Sequence[int], hyper: Hyper) -> list[tuple[np.ndarray, float]]:
+        """Prior widths of a set's columns at each width of the delays up to the most probable, and its log probability.
+
+        Without a late channel that an effect accounts for, the others' delays may well be smaller.
+        """
+        prior, mine = self.prior(chosen, hyper), self._of_unknown_width(chosen)[1]
+        best, log_probability = self._of_widths(chosen, hyper)
+        smaller = np.flatnonzero(WIDTHS <= best[1]) if mine.any() else []
+        return [(np.where(mine, WIDTHS[k], prior), float(log_probability[k])) for k in smaller]
 
     def torque_scale_odds(self, chosen: Sequence[int], hyper: Hyper) -> float:
         """Log evidence for one scale of all torques, the first of the common nuisances, over that of none."""

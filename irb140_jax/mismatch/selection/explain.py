@@ -29,7 +29,7 @@ from irb140_jax.mismatch.regression.rows import (
 from irb140_jax.mismatch.regression.silent import silent_rows
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
-from irb140_jax.mismatch.selection.averages import Site, site_of
+from irb140_jax.mismatch.selection.averages import Sets, Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
@@ -191,16 +191,23 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
     search = partial(selected, without_barred, chosen, every_move=start.whole)
     best, hyper, sets = search()
+    # Slopes at an explanation say nothing of one without what it rests on: under leaning gravity that nothing is named
+    # for, inertials can stand for the tilt.
+    from_nominal: Sets = {}
     if at and not at.rests_on <= _sites(data, best):
-        # Slopes at an explanation say nothing of one without what it rests on: under leaning gravity that nothing is
-        # named for, inertials can stand for the tilt.
         free, last = _explained(given, dataclasses.replace(start, at=None))
         if not at.rests_on <= _sites(free.data, free.chosen):
             return free, last
         best, hyper, sets = search(held=at.rests_on)
+        from_nominal = free.sets
     falling = partial(with_falling_friction, space, data, extra[0], given.scales)
     found, found_hyper, falls = falling(best, hyper)
     last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
+    if last and at and at.rests_on and not from_nominal:
+        free, other = _explained(given, dataclasses.replace(start, at=None))
+        if not at.rests_on <= _sites(free.data, free.chosen):
+            return free, other
+        from_nominal = free.sets
     if last:
         found, found_hyper, falls = falling(*named(space, best, hyper, sets))
     for joint in joints:
@@ -212,7 +219,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     ex = Explanation(
         lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
         unproved=start.unproved, times=start.times, payloads=tuple(r.recording.payload for r in start.along),
-        open_rotors=left_open,
+        open_rotors=left_open, rests_on=at.rests_on if at else frozenset(), from_nominal=from_nominal,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
 

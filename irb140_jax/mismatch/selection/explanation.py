@@ -49,6 +49,9 @@ class Explanation:
         rigid: The fit of the inertials alone, from all blocks of the data or all but some: it predicts where nothing is
             named.  None in logs of commands, where drives err beside it.
         open_rotors: Rotors that are not named and that the torque of servos leaves open, for a fit to the motion.
+        rests_on: Effects at which the regression is linearised: what slopes there say of sets without them is wrong.
+        from_nominal: Log posterior of every set that a search with slopes at the nominal model visited, where there are
+            such effects.
     """
 
     lib: Library
@@ -69,6 +72,8 @@ class Explanation:
     payloads: tuple[Payload | None, ...] = ()
     rigid: Callable[[np.ndarray | None], Posterior] | None = None
     open_rotors: tuple[int, ...] = ()
+    rests_on: frozenset[Site] = frozenset()
+    from_nominal: Sets = dataclasses.field(default_factory=dict)
 
     @property
     def members(self) -> list[Candidate]:
@@ -293,15 +298,20 @@ class Explanation:
         """Of a chosen candidate's effect at its joints, over all sets visited."""
         if index in self.falls:
             return float(special.expit(self.falls[index].log_odds))
-        c = self.data.candidates[index]
-        return probabilities(self.data.candidates, self.sets).get((c.slug, c.joints), 0.0)
+        return probabilities(self.data.candidates, self._sets(index)).get(site_of(self.data.candidates[index]), 0.0)
 
     def rivals(self, index: int) -> dict[Site, float]:
         """Share of the sets in which another effect stands in a chosen candidate's place, by that effect.
 
         Of friction that certainly falls with speed none: with a special case of it, the discrepancy holds the fall.
         """
-        return {} if index in self.falls else in_its_place(self.data.candidates, self.sets, self.chosen, index)[0]
+        if index in self.falls:
+            return {}
+        return in_its_place(self.data.candidates, self._sets(index), self.chosen, index)[0]
+
+    def _sets(self, index: int) -> Sets:
+        """Log posterior of sets with a chosen candidate and without it."""
+        return self.from_nominal if site_of(self.data.candidates[index]) in self.rests_on else self.sets
 
 
 def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:

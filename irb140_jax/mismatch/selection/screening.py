@@ -21,13 +21,25 @@ def near(space: Space, chosen: Sequence[int], hyper: Hyper, columns: np.ndarray)
 
 def gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray) -> np.ndarray:
     """Log posterior odds of adding each of some candidates to a set; -inf if inadmissible."""
+    priors = space.priors_by_delays(chosen, hyper)
+    late = space.late[which] & bool(priors)
+    out = np.full(len(which), -np.inf)
+    out[~late] = _gains(space, chosen, hyper, which[~late], space.prior(chosen, hyper))
+    if late.any():
+        each = [_gains(space, chosen, hyper, which[late], prior) + p for prior, p in priors]
+        out[late] = np.logaddexp.reduce(each)
+    return out
+
+
+def _gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray, prior: np.ndarray) -> np.ndarray:
+    """The same with these prior widths of the set's columns."""
     out = np.full(len(which), -np.inf)
     if not len(which):
         return out
     extra = np.unique(np.concatenate([space.columns[i] for i in which]))
     number = np.full(space.size, -1)
     number[extra] = np.arange(len(extra))
-    base, prior = space.set_columns(chosen), space.prior(chosen, hyper)
+    base = space.set_columns(chosen)
     more = space.kinds.one_more(chosen)
     chol = root(with_prior(space.gram(hyper, base, base) * np.outer(prior, prior)))
     across = prior[:, None] * space.gram(hyper, base, space.with_y(extra))
