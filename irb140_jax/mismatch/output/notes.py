@@ -7,10 +7,10 @@ import numpy as np
 from irb140_jax.effects import At
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.records import digits
-from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
 from irb140_jax.mismatch.regression.nuisances import SCALED
 from irb140_jax.mismatch.regression.sufficient_data import Comparison, mostly_lost
 from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.selection.late_channels import delays_beside
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.recordings.payload import Payload
 from irb140_jax.robot import Robot
@@ -152,19 +152,12 @@ def timing_notes(ex: Explanation) -> list[str]:
     any rare effect.
     """
     space, named = ex.space, {j for c in ex.members if c.effect.place.at is At.LOG_TIMING for j in c.joints}
-    mean, cov = space.posterior(ex.chosen, ex.hyper)
-    at = np.arange(space.offset - space.delays, space.offset)
-    of_all, of_one = settings.DELAY_COMMON, settings.DELAY_JOINT * space.prior(ex.chosen, ex.hyper)[at]
-    weights = np.zeros((len(at), len(mean)))
-    weights[:, space.inertials + 1] = of_all
-    weights[np.arange(len(at)), at] = settings.DELAY_JOINT
-    off = []
-    for j, (early, unsure) in enumerate(zip(weights @ mean, np.sqrt(np.diag(weights @ cov @ weights.T)), strict=True)):
-        odds = log_odds_of_any(early, unsure, float(np.hypot(of_all, of_one[j]))) + np.log(settings.RARE)
-        if j not in named and odds > 0.0 and abs(early) > settings.NOTABLE_DELAY:
-            way = "early" if early > 0.0 else "late"
+    found, off = delays_beside(space, ex.chosen, ex.hyper), []
+    for j in np.flatnonzero(found.notable & (found.log_odds > 0.0)):
+        if j not in named:
+            way = "early" if found.early[j] > 0.0 else "late"
             # To one digit: of a shift in time, the fit knows the slope of the torque alone.
-            off.append(f"{ex.lib.robot.joint_names[j]} about {digits(1e3 * abs(early), 1)} ms {way}")
+            off.append(f"{ex.lib.robot.joint_names[j]} about {digits(1e3 * abs(found.early[j]), 1)} ms {way}")
     if not off:
         return []
     return [f"Torque is logged early or late beside the positions: {', '.join(off)}. The fit allows for it."]

@@ -334,12 +334,16 @@ class Space:
 
     @cached_property
     def alike(self) -> list[list[int]]:
-        """Candidates that differ from each one in shape alone, itself included."""
-        groups: dict[tuple, list[int]] = {}
+        """Candidates that differ from each one in shape alone, itself included.
+
+        Of one shape that follows from an amplitude a refined grid is all copies: it counts once, as in its prior.
+        """
+        groups: dict[tuple, dict[tuple, int]] = {}
         keys = [(c.slug, c.joints, c.variant) for c in self.candidates]
-        for i, key in enumerate(keys):
-            groups.setdefault(key, []).append(i)
-        return [groups[key] for key in keys]
+        shapes = [tuple(c.shape.tolist()) if c.effect.shapes.follows else (i,) for i, c in enumerate(self.candidates)]
+        for i, (key, shape) in enumerate(zip(keys, shapes, strict=True)):
+            groups.setdefault(key, {}).setdefault(shape, i)
+        return [[*(groups[key] | {shape: i}).values()] for i, (key, shape) in enumerate(zip(keys, shapes, strict=True))]
 
     def inadmissible(self, chosen: Sequence[int], hyper: Hyper) -> list[int]:
         """Members of a set whose amplitudes are not such as can be."""

@@ -1,7 +1,7 @@
 """The loop at the heart of a diagnosis: columns, noise, search, and again with finer shapes and the corrected load."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -33,6 +33,7 @@ from irb140_jax.mismatch.selection.averages import Sets, Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
+from irb140_jax.mismatch.selection.late_channels import Late, with_late_channels
 from irb140_jax.mismatch.selection.screening import gains
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
@@ -191,25 +192,31 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
     search = partial(selected, without_barred, chosen, every_move=start.whole)
     best, hyper, sets = search()
+    falling = partial(with_falling_friction, space, data, extra[0], given.scales)
+    in_time = partial(with_late_channels, without_barred, held=at.rests_on if at else frozenset())
+    found, found_hyper, late = in_time(best, hyper)
     # Slopes at an explanation say nothing of one without what it rests on: under leaning gravity that nothing is named
     # for, inertials can stand for the tilt.
     from_nominal: Sets = {}
-    if at and not at.rests_on <= _sites(data, best):
+    late_from_nominal: Mapping[Site, Late] = {}
+    if at and not at.rests_on <= _sites(data, found):
         free, last = _explained(given, dataclasses.replace(start, at=None))
         if not at.rests_on <= _sites(free.data, free.chosen):
             return free, last
         best, hyper, sets = search(held=at.rests_on)
-        from_nominal = free.sets
-    falling = partial(with_falling_friction, space, data, extra[0], given.scales)
-    found, found_hyper, falls = falling(best, hyper)
+        found, found_hyper, late = in_time(best, hyper)
+        from_nominal, late_from_nominal = free.sets, free.late
+    found, found_hyper, falls = falling(found, found_hyper)
     last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
     if last and at and at.rests_on and not from_nominal:
         free, other = _explained(given, dataclasses.replace(start, at=None))
         if not at.rests_on <= _sites(free.data, free.chosen):
             return free, other
-        from_nominal = free.sets
+        from_nominal, late_from_nominal = free.sets, free.late
     if last:
-        found, found_hyper, falls = falling(*named(space, best, hyper, sets))
+        found, found_hyper, late = in_time(*named(space, best, hyper, sets))
+        found, found_hyper, falls = falling(found, found_hyper)
+        late = {site: late_from_nominal.get(site, why) for site, why in late.items()}
     for joint in joints:
         joint.forget()
     left_open = _rotors_open(space, data, found, found_hyper) if last and given.drive is not None else ()
@@ -220,6 +227,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
         unproved=start.unproved, times=start.times, payloads=tuple(r.recording.payload for r in start.along),
         open_rotors=left_open, rests_on=at.rests_on if at else frozenset(), from_nominal=from_nominal,
+        late=late,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
 

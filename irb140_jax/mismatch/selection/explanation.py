@@ -19,6 +19,7 @@ from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, pro
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.falling_friction import Fall
 from irb140_jax.mismatch.selection.hyperparameters import settled
+from irb140_jax.mismatch.selection.late_channels import Late
 from irb140_jax.mismatch.selection.screening import gains, near, reshaped
 from irb140_jax.recordings.drive import LAG_WIDTH, Drive, Times
 from irb140_jax.recordings.low_pass import Band
@@ -52,6 +53,7 @@ class Explanation:
         rests_on: Effects at which the regression is linearised: what slopes there say of sets without them is wrong.
         from_nominal: Log posterior of every set that a search with slopes at the nominal model visited, where there are
             such effects.
+        late: Members that are named because their channel is certainly early or late.
     """
 
     lib: Library
@@ -74,6 +76,7 @@ class Explanation:
     open_rotors: tuple[int, ...] = ()
     rests_on: frozenset[Site] = frozenset()
     from_nominal: Sets = dataclasses.field(default_factory=dict)
+    late: Mapping[Site, Late] = dataclasses.field(default_factory=dict)
 
     @property
     def members(self) -> list[Candidate]:
@@ -107,7 +110,8 @@ class Explanation:
         Without a member, others may have another shape.  In place of a law that is named for its falling curve stands
         ordinary friction, as in the search.
         """
-        members = tuple(sorted(self.falls[c].usual if c in self.falls else c for c in chosen))
+        kept = [c for c in chosen if self._late(c) is None]
+        members = tuple(sorted(self.falls[c].usual if c in self.falls else c for c in kept))
         value = -np.inf
         for other in dict.fromkeys((members, reshaped(self.space, members, self.hyper))):
             known = self.sets.get(frozenset(other))
@@ -279,8 +283,8 @@ class Explanation:
 
         Where others are inadmissible without it, against the best set without it that the search visited.
         """
-        if index in self.falls:
-            return self.falls[index].log_odds
+        if why := self.falls.get(index) or self._late(index):
+            return why.log_odds
         every, c, rest = self.data.candidates, self.data.candidates[index], self.others(index)
         options = [rest]
         if c.effect.place.is_friction and not c.effect.prior.ordinary:
@@ -296,8 +300,9 @@ class Explanation:
 
     def probability(self, index: int) -> float:
         """Of a chosen candidate's effect at its joints, over all sets visited."""
-        if index in self.falls:
-            return float(special.expit(self.falls[index].log_odds))
+        if why := self.falls.get(index) or self._late(index):
+            others = why.rivals.values() if isinstance(why, Late) else ()
+            return float(special.expit(why.log_odds)) * (1.0 - sum(others))
         return probabilities(self.data.candidates, self._sets(index)).get(site_of(self.data.candidates[index]), 0.0)
 
     def rivals(self, index: int) -> dict[Site, float]:
@@ -307,7 +312,13 @@ class Explanation:
         """
         if index in self.falls:
             return {}
+        if why := self._late(index):
+            return dict(why.rivals)
         return in_its_place(self.data.candidates, self._sets(index), self.chosen, index)[0]
+
+    def _late(self, index: int) -> Late | None:
+        """Why a chosen candidate is named, if it is because its channel is certainly early or late."""
+        return self.late.get(site_of(self.data.candidates[index]))
 
     def _sets(self, index: int) -> Sets:
         """Log posterior of sets with a chosen candidate and without it."""
