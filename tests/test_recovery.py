@@ -148,15 +148,26 @@ def test_a_torque_channel_out_of_step_is_named_and_corrected(late):
     assert fit["rmse_corrected"] < 1.3 * fit["noise_floor"] and fit["rmse_refit"] > 3.0 * fit["rmse_corrected"]
 
 
-def test_torque_channels_that_are_all_a_little_late_are_noted_and_not_named():
+def test_torque_channels_that_are_all_a_little_late_are_named_each_with_its_delay():
     robot, case = machine(6, 3, 0.3)
     late = (0.002, 0.003, 0.004)
     behind = lambda r: np.stack([np.interp(r.t - d, r.t, x) for d, x in zip(late, r.tau.T, strict=True)], axis=1)  # noqa: E731
     diagnosis = diagnose(robot, [dataclasses.replace(r, tau=behind(r)) for r in case.recordings]).diagnosis
-    assert not diagnosis.findings
-    (note,) = [note for note in diagnosis.notes if note.startswith("Torque is logged early or late")]
-    for name, delay in zip(robot.joint_names, late, strict=True):
-        assert f"{name} about {1e3 * delay:.0f} ms late" in note
+    assert {f.effect for f in diagnosis.findings} == {"channel_skew"}
+    named = {f.joints[0]: f.parameters["delay"].value for f in diagnosis.findings}
+    assert named == pytest.approx(dict(zip(robot.joint_names, np.negative(late), strict=True)), abs=3e-4)
+
+
+def test_a_log_whose_channels_are_all_out_of_step_is_no_lag_of_drives():
+    robot, case = machine(9, 5, 0.0)
+    late = np.array([0.006, 0.004, 0.0, 0.005, 0.003])
+    behind = lambda r: np.stack([np.interp(r.t - d, r.t, x) for d, x in zip(late, r.tau.T, strict=True)], axis=1)  # noqa: E731
+    diagnosis = diagnose(robot, [dataclasses.replace(r, tau=behind(r)) for r in case.recordings]).diagnosis
+    assert {(f.effect, *f.joints) for f in diagnosis.findings} == {
+        ("channel_skew", name) for name, d in zip(robot.joint_names, late, strict=True) if d > 0.0
+    }
+    for f in diagnosis.findings:
+        assert f.parameters["delay"].value == pytest.approx(-late[robot.joint_names.index(f.joints[0])], abs=3e-4)
 
 
 def test_the_corrected_model_predicts_other_moves_of_the_machine():

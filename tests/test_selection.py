@@ -241,11 +241,19 @@ def test_odds_of_a_finding_without_which_others_are_inadmissible_are_those_again
     sets = {frozenset({0, 1}): -3.0, frozenset({1}): -np.inf, frozenset({2}): -9.0, frozenset(): -12.0}
     data = SimpleNamespace(candidates=space.candidates)
     ex = SimpleNamespace(
-        falls={}, data=data, space=space, chosen=(0, 1), sets=sets, members=[space.candidates[i] for i in (0, 1)],
+        falls={}, _late={}.get, data=data, space=space, chosen=(0, 1), sets=sets, members=[space.candidates[i] for i in (0, 1)],
         others=lambda index: tuple(i for i in (0, 1) if i != index),
         log_posterior=lambda chosen, joints: sets[frozenset(chosen)],
     )  # fmt: skip
     assert Explanation.log_odds(ex, 0) == pytest.approx(6.0)  # pyright: ignore[reportArgumentType]
+
+
+def test_copies_of_a_delay_are_one_shape():
+    space, _ = planted(1, {})
+    skew = [dataclasses.replace(c, effect=CATALOGUE["channel_skew"], joints=(0,), shape=np.array([half]))
+            for c, half in zip(space.candidates[:4], (0.002, 0.003, 0.002, 0.002), strict=True)]  # fmt: skip
+    alike = dataclasses.replace(space, candidates=(*skew, *space.candidates[4:])).alike
+    assert [sorted(group) for group in alike[:4]] == [[0, 1], [0, 1], [1, 2], [1, 3]]
 
 
 def test_the_prior_of_the_widths_is_a_probability():

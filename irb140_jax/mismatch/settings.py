@@ -32,7 +32,8 @@ EVENT_MARGIN = 0.2
 # Torque scale of all joints, and of each beside it.  Data sheets of servo motors state torque constants to +-10 %;
 # that motors of one arm scatter by a third of it is a judgement.
 GAIN_COMMON, GAIN_JOINT = 0.10, 0.03
-# [s] between torque and position channels: a sample of a controller at 1 kHz, and half of one from joint to joint.
+# [s] between torque and position channels: a sample of a controller at 1 kHz, and half of one from joint to joint.  The
+# latter is where the width of delays from joint to joint starts, which is not known (decision 30).
 DELAY_COMMON, DELAY_JOINT = 1e-3, 5e-4
 # [s^2] of the torque's second derivative: what smoothing takes off accelerations that noise hides.
 SMOOTHED = 2e-5

@@ -88,35 +88,35 @@ def with_late_channels(
     found = delays_beside(space, base, beside)
     certain = found.notable & (found.log_odds >= np.log(settings.NAMED / (1.0 - settings.NAMED)))
     options = [_shifting(space, base, beside, int(j), held) for j in np.flatnonzero(certain)]
-    kinds = sorted({slug for of_joint in options for slug in of_joint})
-    total = {k: sum(o[k][0] if k in o else max(v for v, _ in o.values()) for o in options if o) for k in kinds}
-    worth = special.softmax([total[k] for k in kinds]) if kinds else []
-    kind = max(kinds, key=lambda k: total[k], default="")
-    chosen, late = list(base), {}
-    for j, of_joint in zip(np.flatnonzero(certain), options, strict=True):
-        if of_joint:
-            _, member = of_joint[kind] if kind in of_joint else max(of_joint.values())
-            chosen.append(member)
-            others = {(k, (int(j),)): float(w) for k, w in zip(kinds, worth, strict=True)
-                      if k in of_joint and k != candidates[member].slug}  # fmt: skip
-            late[site_of(candidates[member])] = Late(float(found.log_odds[j]), others)
-    taken = {j for i in chosen if i not in base for j in candidates[i].joints}
-    chosen += [i for i in timed if not taken & set(candidates[i].joints)]
-    stated = tuple(sorted(chosen))
-    return stated, (hyper if stated == best else settled(space, stated, beside)[1]), late
+    options = [of_joint for of_joint in options if of_joint]
+    if not options:
+        return best, hyper, {}
+    # One kind for all channels, where one suits them all.
+    sets = [tuple(o[kind] for o in options) for kind in options[0] if all(kind in o for o in options)]
+    sets = sets or [tuple(next(iter(o.values())) for o in options)]
+    values, hypers = zip(*(settled(space, tuple(sorted((*base, *members))), beside) for members in sets), strict=True)
+    most = int(np.argmax(values))
+    worth = special.softmax(values) if np.isfinite(values[most]) else np.eye(len(sets))[most]
+    late: dict[Site, Late] = {}
+    for at, member in enumerate(sets[most]):
+        others = {site_of(candidates[m[at]]): float(w) for m, w in zip(sets, worth, strict=True) if m is not sets[most]}
+        late[site_of(candidates[member])] = Late(float(found.log_odds[candidates[member].joints[0]]), others)
+    moved = {j for i in sets[most] for j in candidates[i].joints}
+    kept = [i for i in timed if not moved & set(candidates[i].joints)]
+    stated = tuple(sorted((*base, *sets[most], *kept)))
+    if stated == best:
+        return best, hyper, late
+    return stated, settled(space, stated, beside)[1] if kept else hypers[most], late
 
 
-def _shifting(
-    space: Space, base: tuple[int, ...], hyper: Hyper, j: int, held: frozenset[Site]
-) -> dict[str, tuple[float, int]]:
-    """Effects that shift one channel in time, by name: log posterior odds over all shapes, and the best candidate."""
+def _shifting(space: Space, base: tuple[int, ...], hyper: Hyper, j: int, held: frozenset[Site]) -> dict[str, int]:
+    """Effects that shift one channel in time, by name: the candidate with the best shape, the best effect first."""
     which = [i for i, c in enumerate(space.candidates) if space.late[i] and c.joints == (j,)]
     kept = [i for i in which if site_of(space.candidates[i]) in held]
-    first = {space.candidates[i].slug: i for i in reversed(kept or which)}
     out: dict[str, tuple[float, int]] = {}
-    for slug, i in first.items():
+    for slug, i in {space.candidates[i].slug: i for i in reversed(kept or which)}.items():
         shapes = np.array(space.alike[i])
         gained = gains(space, base, hyper, shapes)
         if np.isfinite(gained).any():
-            out[slug] = float(np.logaddexp.reduce(gained)), int(shapes[np.argmax(gained)])
-    return out
+            out[slug] = float(np.max(gained)), int(shapes[np.argmax(gained)])
+    return {slug: i for slug, (_, i) in sorted(out.items(), key=lambda item: -item[1][0])}
