@@ -241,7 +241,8 @@ def test_odds_of_a_finding_without_which_others_are_inadmissible_are_those_again
     sets = {frozenset({0, 1}): -3.0, frozenset({1}): -np.inf, frozenset({2}): -9.0, frozenset(): -12.0}
     data = SimpleNamespace(candidates=space.candidates)
     ex = SimpleNamespace(
-        falls={}, _late={}.get, data=data, space=space, chosen=(0, 1), sets=sets, members=[space.candidates[i] for i in (0, 1)],
+        falls={}, _late={}.get, data=data, space=space, chosen=(0, 1), sets=sets,
+        members=[space.candidates[i] for i in (0, 1)],
         others=lambda index: tuple(i for i in (0, 1) if i != index),
         log_posterior=lambda chosen, joints: sets[frozenset(chosen)],
     )  # fmt: skip
