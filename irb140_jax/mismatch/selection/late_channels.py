@@ -17,7 +17,7 @@ from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
 from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.hyperparameters import settled
-from irb140_jax.mismatch.selection.screening import gains
+from irb140_jax.mismatch.selection.screening import gains, reshaped
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,7 +68,7 @@ def delays_beside(space: Space, chosen: Sequence[int], hyper: Hyper) -> Delays:
 def with_late_channels(
     space: Space, best: tuple[int, ...], hyper: Hyper, held: frozenset[Site] = frozenset()
 ) -> tuple[tuple[int, ...], Hyper, Mapping[Site, Late]]:
-    """A set with an effect for every channel that is certainly early or late: the kind that suits all of them best.
+    """A set with an effect for every channel that is certainly early or late.
 
     Args:
         space: What may be in a set; what is impossible beforehand is not taken.
@@ -88,25 +88,49 @@ def with_late_channels(
     found = delays_beside(space, base, beside)
     certain = found.notable & (found.log_odds >= np.log(settings.NAMED / (1.0 - settings.NAMED)))
     options = [_shifting(space, base, beside, int(j), held) for j in np.flatnonzero(certain)]
-    options = [of_joint for of_joint in options if of_joint]
-    if not options:
-        return best, hyper, {}
-    # One kind for all channels, where one suits them all.
-    sets = [tuple(o[kind] for o in options) for kind in options[0] if all(kind in o for o in options)]
-    sets = sets or [tuple(next(iter(o.values())) for o in options)]
-    values, hypers = zip(*(settled(space, tuple(sorted((*base, *members))), beside) for members in sets), strict=True)
-    most = int(np.argmax(values))
-    worth = special.softmax(values) if np.isfinite(values[most]) else np.eye(len(sets))[most]
+    chosen, worth = _most_probable(space, base, beside, [of_joint for of_joint in options if of_joint])
     late: dict[Site, Late] = {}
-    for at, member in enumerate(sets[most]):
-        others = {site_of(candidates[m[at]]): float(w) for m, w in zip(sets, worth, strict=True) if m is not sets[most]}
-        late[site_of(candidates[member])] = Late(float(found.log_odds[candidates[member].joints[0]]), others)
-    moved = {j for i in sets[most] for j in candidates[i].joints}
-    kept = [i for i in timed if not moved & set(candidates[i].joints)]
-    stated = tuple(sorted((*base, *sets[most], *kept)))
-    if stated == best:
-        return best, hyper, late
-    return stated, settled(space, stated, beside)[1] if kept else hypers[most], late
+    for c in (candidates[i] for i in chosen if space.late[i]):
+        rivals = {(slug, c.joints): p for slug, p in worth[c.joints[0]].items() if slug != c.slug}
+        late[site_of(c)] = Late(float(found.log_odds[c.joints[0]]), rivals)
+    kept = [i for i in timed if candidates[i].joints[0] not in worth]
+    stated = tuple(sorted((*chosen, *kept)))
+    return stated, hyper if stated == best else settled(space, stated, beside)[1], late
+
+
+def _most_probable(
+    space: Space, base: tuple[int, ...], hyper: Hyper, options: list[dict[str, int]]
+) -> tuple[tuple[int, ...], dict[int, dict[str, float]]]:
+    """A set with the most probable effect of each channel, and by joint how probable each effect is, others given.
+
+    From one kind for all channels, where one suits them all, one channel after another.
+    """
+    known: dict[tuple[int, ...], tuple[float, tuple[int, ...]]] = {}
+
+    def judged(members: tuple[int, ...]) -> tuple[float, tuple[int, ...]]:
+        if members not in known:
+            tried, now = set[tuple[int, ...]](), tuple(sorted((*base, *members)))
+            while now not in tried and not np.isfinite(value := settled(space, now, hyper)[0]):
+                tried.add(now)
+                now = reshaped(space, now, hyper)
+            known[members] = value, now
+        return known[members]
+
+    each = [[*of_joint.values()] for of_joint in options]
+    exchanged = lambda members, at: [(*members[:at], i, *members[at + 1 :]) for i in each[at]]  # noqa: E731
+    kinds = set[str].intersection(*map(set, options)) if options else ()
+    alike = [tuple(of_joint[kind] for of_joint in options) for kind in sorted(kinds)]
+    members = max(alike or [tuple(of_joint[0] for of_joint in each)], key=judged)
+    for at in range(len(members)):
+        members = max(exchanged(members, at), key=judged)
+    value, chosen = judged(members)
+    if not np.isfinite(value):
+        return base, {}
+    worth: dict[int, dict[str, float]] = {}
+    for at, of_joint in enumerate(options):
+        shares = special.softmax([judged(other)[0] for other in exchanged(members, at)])
+        worth[space.candidates[members[at]].joints[0]] = dict(zip(of_joint, shares.tolist(), strict=True))
+    return chosen, worth
 
 
 def _shifting(space: Space, base: tuple[int, ...], hyper: Hyper, j: int, held: frozenset[Site]) -> dict[str, int]:
