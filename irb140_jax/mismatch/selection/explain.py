@@ -208,9 +208,10 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         from_nominal, late_from_nominal = free.sets, free.late
     found, found_hyper, falls = falling(found, found_hyper)
     last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
-    if last and at and at.rests_on and not from_nominal:
+    timing = frozenset((law.effect.slug, law.joints) for law in at.timing) if at else frozenset()
+    if last and timing and not from_nominal:
         free, other = _explained(given, dataclasses.replace(start, at=None))
-        if not at.rests_on <= _sites(free.data, free.chosen):
+        if not timing <= _sites(free.data, free.chosen):
             return free, other
         from_nominal, late_from_nominal = free.sets, free.late
     if last:
@@ -226,8 +227,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     ex = Explanation(
         lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
         unproved=start.unproved, times=start.times, payloads=tuple(r.recording.payload for r in start.along),
-        open_rotors=left_open, rests_on=at.rests_on if at else frozenset(), from_nominal=from_nominal,
-        late=late,
+        open_rotors=left_open, linearised_at=timing, from_nominal=from_nominal, late=late,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
 

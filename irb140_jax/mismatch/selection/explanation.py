@@ -50,7 +50,8 @@ class Explanation:
         rigid: The fit of the inertials alone, from all blocks of the data or all but some: it predicts where nothing is
             named.  None in logs of commands, where drives err beside it.
         open_rotors: Rotors that are not named and that the torque of servos leaves open, for a fit to the motion.
-        rests_on: Effects at which the regression is linearised: what slopes there say of sets without them is wrong.
+        linearised_at: Lags and delays at which the regression is linearised: what slopes there say of sets without
+            them is wrong.
         from_nominal: Log posterior of every set that a search with slopes at the nominal model visited, where there are
             such effects.
         late: Members that are named because their channel is certainly early or late.
@@ -74,7 +75,7 @@ class Explanation:
     payloads: tuple[Payload | None, ...] = ()
     rigid: Callable[[np.ndarray | None], Posterior] | None = None
     open_rotors: tuple[int, ...] = ()
-    rests_on: frozenset[Site] = frozenset()
+    linearised_at: frozenset[Site] = frozenset()
     from_nominal: Sets = dataclasses.field(default_factory=dict)
     late: Mapping[Site, Late] = dataclasses.field(default_factory=dict)
 
@@ -322,7 +323,8 @@ class Explanation:
 
     def _sets(self, index: int) -> Sets:
         """Log posterior of sets with a chosen candidate and without it."""
-        return self.from_nominal if site_of(self.data.candidates[index]) in self.rests_on else self.sets
+        there = self.from_nominal and site_of(self.data.candidates[index]) in self.linearised_at
+        return self.from_nominal if there else self.sets
 
 
 def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:

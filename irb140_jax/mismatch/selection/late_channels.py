@@ -87,6 +87,8 @@ def with_late_channels(
     beside = settled(space, base, hyper)[1] if timed else hyper
     found = delays_beside(space, base, beside)
     certain = found.notable & (found.log_odds >= np.log(settings.NAMED / (1.0 - settings.NAMED)))
+    if not certain.any():
+        return best, hyper, {}
     options = [_shifting(space, base, beside, int(j), held) for j in np.flatnonzero(certain)]
     chosen, worth = _most_probable(space, base, beside, [of_joint for of_joint in options if of_joint])
     late: dict[Site, Late] = {}
