@@ -12,7 +12,6 @@ from irb140_jax.compilation_cache import make_room_for_programs
 from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import InputError
-from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.corrected.fitted import discrepancy_carried, fitted_model
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file
@@ -27,7 +26,7 @@ from irb140_jax.mismatch.output.document import (
     with_joints_blocked,
     with_time_left_out,
 )
-from irb140_jax.mismatch.output.findings import findings, torque_scale_odds
+from irb140_jax.mismatch.output.findings import findings
 from irb140_jax.mismatch.output.provenance import provenance
 from irb140_jax.mismatch.output.servos import by_known_payload, harmful_discrepancy, without_negligible
 from irb140_jax.mismatch.output.store import Result
@@ -259,9 +258,7 @@ def _explained(
     later = lambda times: data.later(times).smooth  # noqa: E731
     effects = _searched(config, data)
     ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved, later)
-    ex = without_negligible(ex, data.servo)
-    scaled = data.servo is None and torque_scale_odds(ex)[1] >= settings.NAMED
-    return dataclasses.replace(ex, scaled=scaled)
+    return dataclasses.replace(without_negligible(ex, data.servo), scaled=ex.scale_found)
 
 
 def _corrected(

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
-from scipy import special
 
 from irb140_jax.effects import Effect
 from irb140_jax.effects.base import separating_motion
@@ -13,6 +12,7 @@ from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.output.certain import certain
 from irb140_jax.mismatch.result import Alternative, Estimate, Evidence, Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
+from irb140_jax.mismatch.selection.torque_scale import scale_log_odds
 from irb140_jax.mismatch.validation.held_out import held_out_gains
 from irb140_jax.mismatch.validation.intervals import parameters_of, physical_of
 from irb140_jax.robot import Robot
@@ -61,15 +61,6 @@ def _in_motion(c: Candidate, of_torque: Mapping[str, Estimate], w: np.ndarray) -
     }
 
 
-def torque_scale_odds(ex: Explanation) -> tuple[float, float]:
-    """Log odds that one scale of all torques is off, and its probability.
-
-    A nuisance parameter with a stated prior; the prior odds are those of any rare effect.
-    """
-    odds = ex.space.torque_scale_odds(ex.chosen, ex.hyper) + np.log(settings.RARE)
-    return float(odds), float(special.expit(odds))
-
-
 def torque_scale_finding(robot: Robot, ex: Explanation, weighed: bool) -> list[Finding]:
     """The torque of all joints logged too large or too small by one factor, where that is probable.
 
@@ -78,9 +69,10 @@ def torque_scale_finding(robot: Robot, ex: Explanation, weighed: bool) -> list[F
         ex: The explanation.
         weighed: Whether the tool carried a known payload in some recordings.
     """
-    odds, probability = torque_scale_odds(ex)
     if not ex.scaled:
         return []
+    index = len(ex.data.candidates)
+    odds, probability = scale_log_odds(ex.space, ex.chosen, ex.hyper), ex.probability(index)
     w, std = ex.torque_scale()
     gain, spread, way = 1.0 / (1.0 + w), std / (1.0 + w) ** 2, "large" if w > 0 else "small"
     by_what = "by what the known payload adds to it" if weighed else (
@@ -93,13 +85,13 @@ def torque_scale_finding(robot: Robot, ex: Explanation, weighed: bool) -> list[F
         # Without it refitted inertials explain the same torque, so it removes no error on unseen data.
         Evidence(odds, probability, 0.0),
         f"The logged torque of all joints is {100 * abs(w):.3g} +- {100 * std:.2g} % too {way} {by_what}.",
-        (),
+        _alternatives(ex, index),
     )]  # fmt: skip
 
 
 def _alternatives(ex: Explanation, index: int) -> tuple[Alternative, ...]:
     """Effects that may be true in a finding's place, and what to record; a part of its law is no alternative to it."""
-    c, effects = ex.data.candidates[index], ex.lib.effects
+    c, effects = ex.averaged_over[index], ex.lib.effects
     best: dict[str, float] = {}
     for (slug, _), p in ex.rivals(index).items():
         if slug in effects and slug != c.slug and p > settings.LISTED_PROBABILITY:

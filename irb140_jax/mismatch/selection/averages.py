@@ -12,11 +12,16 @@ Site = tuple[str, tuple[int, ...]]
 Sets = Mapping[frozenset[int], float]  # log posterior of sets of candidates
 
 
+def near_best(sets: Sets) -> Sets:
+    """Those within `WITHIN` of the best."""
+    top = max(sets.values())
+    return {s: v for s, v in sets.items() if top - v <= settings.WITHIN} if np.isfinite(top) else {}
+
+
 def weights(sets: Sets) -> dict[frozenset[int], float]:
     """Probability of each set within `WITHIN` of the best."""
     top = max(sets.values())
-    close = {s: v for s, v in sets.items() if top - v <= settings.WITHIN} if np.isfinite(top) else {}
-    near = {s: float(np.exp(v - top)) for s, v in close.items()}
+    near = {s: float(np.exp(v - top)) for s, v in near_best(sets).items()}
     total = sum(near.values())
     return {s: w / total for s, w in near.items()}
 

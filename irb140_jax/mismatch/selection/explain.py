@@ -33,10 +33,12 @@ from irb140_jax.mismatch.selection.averages import Sets, Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
+from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.late_channels import Late, with_late_channels
 from irb140_jax.mismatch.selection.screening import gains
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
+from irb140_jax.mismatch.selection.torque_scale import beside_scale, scale_of
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.drive import LAG_WIDTH, Drive, Times
 from irb140_jax.recordings.low_pass import Band
@@ -191,7 +193,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     barred = [start.dropped.count(site) >= OFTEN or site in start.unproved for site in sites]
     without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
     search = partial(selected, without_barred, chosen, every_move=start.whole)
-    best, hyper, sets = search()
+    best, hyper, visited = search()
     falling = partial(with_falling_friction, space, data, extra[0], given.scales)
     in_time = partial(with_late_channels, without_barred, held=at.rests_on if at else frozenset())
     found, found_hyper, late = in_time(best, hyper)
@@ -203,9 +205,9 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         free, last = _explained(given, dataclasses.replace(start, at=None))
         if not at.rests_on <= _sites(free.data, free.chosen):
             return free, last
-        best, hyper, sets = search(held=at.rests_on)
+        best, hyper, visited = search(held=at.rests_on)
         found, found_hyper, late = in_time(best, hyper)
-        from_nominal, late_from_nominal = free.sets, free.late
+        from_nominal, late_from_nominal = free.averaged, free.late
     found, found_hyper, falls = falling(found, found_hyper)
     last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
     timing = frozenset((law.effect.slug, law.joints) for law in at.timing) if at else frozenset()
@@ -213,9 +215,15 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         free, other = _explained(given, dataclasses.replace(start, at=None))
         if not timing <= _sites(free.data, free.chosen):
             return free, other
-        from_nominal, late_from_nominal = free.sets, free.late
+        from_nominal, late_from_nominal = free.averaged, free.late
+    sets = averaged = {s: value for s, (value, _) in visited.items()}
+    scale, scale_found = scale_of(space), False
     if last:
-        found, found_hyper, late = in_time(*named(space, best, hyper, sets))
+        averaged = beside_scale(space, visited) if given.drive is None else sets
+        every = named((*space.candidates, scale), averaged)
+        stated = tuple(i for i in every if i < len(space.candidates))
+        scale_found = stated != every
+        found, found_hyper, late = in_time(stated, hyper if stated == best else settled(space, stated, hyper)[1])
         found, found_hyper, falls = falling(found, found_hyper)
         late = {site: late_from_nominal.get(site, why) for site, why in late.items()}
     for joint in joints:
@@ -225,8 +233,9 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
     data = dataclasses.replace(data, stretches=held)
     ex = Explanation(
-        lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, given.factor, falls,
-        unproved=start.unproved, times=start.times, payloads=tuple(r.recording.payload for r in start.along),
+        lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, averaged, scale,
+        given.factor, falls, scale_found, unproved=start.unproved, times=start.times,
+        payloads=tuple(r.recording.payload for r in start.along),
         open_rotors=left_open, linearised_at=timing, from_nominal=from_nominal, late=late,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last

@@ -40,10 +40,13 @@ class Explanation:
         by_block: The same of what is named alone, by block of the data, once the search is over.
         chosen: Indices of the candidates that are named.
         hyper: Sizes of the discrepancy and noise levels of each joint beside them.
-        sets: Log posterior of every set that the search visited.
+        sets: Log posterior of every set that the search visited, with some scale of all logged torques in each.
+        averaged: That of sets with the candidate `scale` and without any scale, over which probabilities are averages.
+        scale: One scale of all logged torques; as a member of sets it comes after all candidates.
+        scale_found: Whether it is a finding.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
         falls: Members that are named because friction certainly falls with speed, whatever its form.
-        scaled: Whether one scale of all logged torques is a finding.
+        scaled: Whether it is in posteriors, as a finding is.
         unproved: What the search found and unseen motions speak against: not named.
         times: When drives act, by which torques of its rows were made.
         payloads: What the tool carried in each recording, by which its rows were made.
@@ -67,8 +70,11 @@ class Explanation:
     chosen: tuple[int, ...]
     hyper: Hyper
     sets: Sets
+    averaged: Sets
+    scale: Candidate
     factor: np.ndarray
     falls: Mapping[int, Fall] = dataclasses.field(default_factory=dict)
+    scale_found: bool = False
     scaled: bool = False
     unproved: tuple[Site, ...] = ()
     times: Times = Times()
@@ -83,6 +89,11 @@ class Explanation:
     def members(self) -> list[Candidate]:
         """The chosen candidates."""
         return [self.data.candidates[c] for c in self.chosen]
+
+    @property
+    def averaged_over(self) -> Sequence[Candidate]:
+        """What sets in `averaged` consist of."""
+        return [*self.data.candidates, self.scale]
 
     @property
     def level(self) -> np.ndarray:
@@ -304,7 +315,7 @@ class Explanation:
         if why := self.falls.get(index) or self._late(index):
             others = why.rivals.values() if isinstance(why, Late) else ()
             return float(special.expit(why.log_odds)) * (1.0 - sum(others))
-        return probabilities(self.data.candidates, self._sets(index)).get(site_of(self.data.candidates[index]), 0.0)
+        return probabilities(self.averaged_over, self._sets(index)).get(site_of(self.averaged_over[index]), 0.0)
 
     def rivals(self, index: int) -> dict[Site, float]:
         """Share of the sets in which another effect stands in a chosen candidate's place, by that effect.
@@ -315,16 +326,17 @@ class Explanation:
             return {}
         if why := self._late(index):
             return dict(why.rivals)
-        return in_its_place(self.data.candidates, self._sets(index), self.chosen, index)[0]
+        stated = (*self.chosen, len(self.data.candidates)) if self.scale_found else self.chosen
+        return in_its_place(self.averaged_over, self._sets(index), stated, index)[0]
 
     def _late(self, index: int) -> Late | None:
         """Why a chosen candidate is named, if it is because its channel is certainly early or late."""
-        return self.late.get(site_of(self.data.candidates[index]))
+        return self.late.get(site_of(self.averaged_over[index]))
 
     def _sets(self, index: int) -> Sets:
         """Log posterior of sets with a chosen candidate and without it."""
-        there = self.from_nominal and site_of(self.data.candidates[index]) in self.linearised_at
-        return self.from_nominal if there else self.sets
+        there = self.from_nominal and site_of(self.averaged_over[index]) in self.linearised_at
+        return self.from_nominal if there else self.averaged
 
 
 def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:

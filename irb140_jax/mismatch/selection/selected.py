@@ -1,25 +1,27 @@
 """Which set of candidates explains the rows, with model discrepancy and errors of the instrument beside it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from irb140_jax.mismatch import settings
+from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gram import START, own_scale
 from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals, ridge
 from irb140_jax.mismatch.regression.nuisances import Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
-from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.search import Search
+
+Visited = Mapping[frozenset[int], tuple[float, Hyper]]
 
 FREE = (*([len(settings.DISCREPANCY_SIZES) - 1] * (len(START) - 1)), START[-1])  # a discrepancy of any size
 
 
 def selected(
     space: Space, chosen: Sequence[int] = (), *, every_move: bool = True, held: frozenset[Site] = frozenset()
-) -> tuple[tuple[int, ...], Hyper, Sets]:
+) -> tuple[tuple[int, ...], Hyper, Visited]:
     """Search for the best set.
 
     Args:
@@ -29,35 +31,30 @@ def selected(
         held: Effects that are in every set.
 
     Returns:
-        The best set, sizes and levels beside it, and the log posterior of every set visited.
+        The best set, sizes and levels beside it, and log posterior, sizes and levels of every set visited.
     """
     search = Search(space, (START,) * len(space.joints), held)
     best = search.run(chosen, every_move=every_move)
-    return best, search.visited[frozenset(best)][1], {s: v for s, (v, _) in search.visited.items() if search.holds(s)}
+    return best, search.visited[frozenset(best)][1], {s: of for s, of in search.visited.items() if search.holds(s)}
 
 
-def named(space: Space, best: tuple[int, ...], hyper: Hyper, sets: Sets) -> tuple[tuple[int, ...], Hyper]:
+def named(candidates: Sequence[Candidate], sets: Sets) -> tuple[int, ...]:
     """What is stated: the members of a set that are probable together with what may stand in their place.
 
     Of sets that can't be told from the best one it is that with the fewest members beside ordinary friction, and of
     those that with the fewest in all: two names for what may be one need the odds for it, ordinary friction needs none.
 
     Args:
-        space: What may be in a set.
-        best: The best set.
-        hyper: Sizes and levels beside it.
+        candidates: What may be in a set.
         sets: Log posterior of every set visited.
-
-    Returns:
-        The members, and sizes and levels beside them.
     """
-    top, least = frozenset(best), sets[frozenset(best)] - np.log(settings.NAMED / (1.0 - settings.NAMED))
+    top = max(sets, key=lambda s: sets[s])
+    least = sets[top] - np.log(settings.NAMED / (1.0 - settings.NAMED))
     # Whether one of its own members may be missing is for that member's probability to say.
     even = [s for s, value in sets.items() if value > least and not s < top]
-    beside = lambda s: sum(not space.candidates[i].effect.prior.ordinary for i in s)  # noqa: E731
+    beside = lambda s: sum(not candidates[i].effect.prior.ordinary for i in s)  # noqa: E731
     few = tuple(sorted(min(even, key=lambda s: (beside(s), len(s), -sets[s]))))
-    sure = tuple(i for i in few if in_its_place(space.candidates, sets, few, i)[1] >= settings.NAMED)
-    return sure, hyper if sure == best else settled(space, sure, hyper)[1]
+    return tuple(i for i in few if in_its_place(candidates, sets, few, i)[1] >= settings.NAMED)
 
 
 def flexible_noise(data: Data, extra: Sequence[Nuisances]) -> Noise:

@@ -1,118 +1,32 @@
-"""The evidence of sets with model discrepancy, against the density of the data itself; the search on planted sets."""
+"""The evidence of sets with model discrepancy, against the density of the data itself."""
 
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers_selection import (
+    COMMON,
+    GROUPS,
+    INERTIALS,
+    OWN,
+    ROWS,
+    SETTING,
+    dense_posterior,
+    density,
+    planted,
+    with_payload,
+)
 from scipy import integrate, signal, stats
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import settings
-from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.gram import LEVELS, ONE, JointGram, log_prior_of_sizes, own_scale
 from irb140_jax.mismatch.regression.noise import correlation_time
-from irb140_jax.mismatch.selection.averages import probabilities
-from irb140_jax.mismatch.selection.evidence import Space
-from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.hyperparameters import over_shapes, settled
 from irb140_jax.mismatch.selection.kinds import Kinds
-from irb140_jax.mismatch.selection.screening import gains, reshaped
-from irb140_jax.mismatch.selection.search import Search
-from irb140_jax.mismatch.selection.selected import named, selected
+from irb140_jax.mismatch.selection.screening import gains
+from irb140_jax.mismatch.selection.torque_scale import beside_scale
 from irb140_jax.mismatch.selection.unknown_width import LOG_PRIOR, WIDTHS
-
-ROWS, INERTIALS, COMMON, OWN = 60, 3, 1, 5
-SLUGS = ("coulomb_friction", "viscous_friction", "torque_offset", "rotor_inertia")
-GROUPS = np.array([-1, 0, 0, 1, 2])
-SETTING = (3, 4, 2, ONE + 1)
-
-
-def planted(seed: int, amplitudes: dict[int, float]) -> tuple[Space, list[dict[str, np.ndarray]]]:
-    """Two joints with four candidates each, of one column; what is planted is their sum and unit noise.
-
-    Returns:
-        The space, and each joint's own columns E, shared columns X and torque y.
-    """
-    rng = np.random.default_rng(seed)
-    size = INERTIALS + COMMON + 2 * len(SLUGS)
-    candidates, joints, data = [], [], []
-    for j in range(2):
-        for k, slug in enumerate(SLUGS):
-            columns = np.array([len(SLUGS) * j + k])
-            free = np.array([np.inf])
-            candidates.append(Candidate(CATALOGUE[slug], (j,), np.zeros(0), columns, (0,), -free, free))
-        mine = [*range(INERTIALS + COMMON), *(INERTIALS + COMMON + len(SLUGS) * j + k for k in range(len(SLUGS)))]
-        E, X = rng.normal(size=(ROWS, OWN)), rng.normal(size=(ROWS, len(mine)))
-        y = rng.normal(size=ROWS)
-        for c, w in amplitudes.items():
-            if c // len(SLUGS) == j:
-                y = y + w * X[:, INERTIALS + COMMON + c % len(SLUGS)]
-        A = np.column_stack([E, X, y])
-        joints.append(JointGram(np.array([*mine, size]), (A.T @ A)[None], GROUPS, np.array([ROWS])))
-        data.append({"E": E, "X": X, "y": y, "mine": np.array(mine)})
-    prior = np.full(len(candidates), np.log(0.05))
-    free = np.full((len(candidates), 1), np.inf)
-    nothing = np.zeros((len(candidates), 1)), -free[:, 0]
-    kinds = Kinds(np.full(len(candidates), -1), np.zeros(0), 0.05)
-    space = Space(
-        tuple(joints), tuple(candidates), INERTIALS, INERTIALS + COMMON, size, prior, kinds, -free, free, *nothing,
-        np.zeros((2, len(candidates))), np.zeros(COMMON),
-    )  # fmt: skip
-    return space, data
-
-
-def with_payload(space: Space) -> Space:
-    """The same space, whose first candidate is a payload that moves both joints."""
-    payload = Candidate(CATALOGUE["payload"], (0, 1), np.zeros(0), np.array([0, 4]), (0, 1), np.zeros(2), np.ones(2))
-    free = np.full((len(space.candidates), 2), np.inf)
-    return dataclasses.replace(
-        space, candidates=(payload, *space.candidates[1:]), lowest=-free, highest=free, weights=np.zeros_like(free)
-    )
-
-
-def density(
-    space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], hyper, width: float, tied: float = 1.0,
-    common: float = 1.0,
-) -> float:  # fmt: skip
-    """Log density of both joints' torque with every unknown integrated out by its covariance: no Gram matrices.
-
-    The inertials' prior is as many times as wide as stated as `width` says, a payload's as `tied` does, that of common
-    nuisances as `common` does.
-    """
-    columns = space.set_columns(chosen)
-    shared, blocks = [], []
-    for d, of_joint in zip(data, hyper, strict=True):
-        wide = np.zeros((ROWS, space.size))
-        wide[:, d["mine"]] = d["X"]
-        wide[:, :INERTIALS] *= width
-        wide[:, INERTIALS : INERTIALS + COMMON] *= common
-        for c in (space.candidates[i] for i in chosen if space.candidates[i].slug == "payload"):
-            wide[:, c.columns + space.offset] *= tied
-        shared.append(wide[:, columns])
-        E = d["E"] * own_scale(GROUPS, of_joint)
-        blocks.append(E @ E.T + LEVELS[of_joint[-1]] ** 2 * np.eye(ROWS))
-    Z = np.concatenate(shared)
-    cov = Z @ Z.T
-    cov[:ROWS, :ROWS] += blocks[0]
-    cov[ROWS:, ROWS:] += blocks[1]
-    y = np.concatenate([d["y"] for d in data])
-    mean = Z[:, INERTIALS : INERTIALS + COMMON] @ space.centre
-    density = stats.multivariate_normal(mean, cov)  # pyright: ignore[reportArgumentType]: stubs want a number
-    return float(density.logpdf(y)) + 0.5 * len(y) * np.log(2.0 * np.pi)
-
-
-def dense_posterior(space: Space, data, chosen: tuple[int, ...], hyper, prior: np.ndarray):
-    """Mean and covariance of a set's columns under these prior standard deviations, without Gram matrices."""
-    columns, precision, moment = space.set_columns(chosen), np.diag(1.0 / prior**2), 0.0
-    for d, of_joint in zip(data, hyper, strict=True):
-        wide = np.zeros((ROWS, space.size))
-        wide[:, d["mine"]] = d["X"]
-        E = d["E"] * own_scale(GROUPS, of_joint)
-        inverse = np.linalg.inv(E @ E.T + LEVELS[of_joint[-1]] ** 2 * np.eye(ROWS))
-        precision = precision + wide[:, columns].T @ inverse @ wide[:, columns]
-        moment = moment + wide[:, columns].T @ inverse @ d["y"]
-    return np.linalg.solve(precision, moment), np.linalg.inv(precision)
 
 
 @pytest.mark.parametrize("centre", [0.0, 1.3])
@@ -236,17 +150,24 @@ def test_functions_of_shared_and_own_columns_have_the_moments_of_a_dense_regress
     np.testing.assert_allclose(spread, both @ cov @ both.T, atol=1e-9)
 
 
-def test_odds_of_a_finding_without_which_others_are_inadmissible_are_those_against_the_best_set_visited():
-    space, _ = planted(1, {})
-    sets = {frozenset({0, 1}): -3.0, frozenset({1}): -np.inf, frozenset({2}): -9.0, frozenset(): -12.0}
-    data = SimpleNamespace(candidates=space.candidates)
-    ex = SimpleNamespace(
-        falls={}, _late={}.get, data=data, space=space, chosen=(0, 1), sets=sets,
-        members=[space.candidates[i] for i in (0, 1)],
-        others=lambda index: tuple(i for i in (0, 1) if i != index),
-        log_posterior=lambda chosen, joints: sets[frozenset(chosen)],
-    )  # fmt: skip
-    assert Explanation.log_odds(ex, 0) == pytest.approx(6.0)  # pyright: ignore[reportArgumentType]
+@pytest.mark.parametrize("common", [0.0, 30.0])
+def test_a_set_counts_with_a_scale_of_all_torques_and_without_any(common):
+    space, data = planted(2, {2: 1.0})
+    for d in data:  # the first of the common nuisances
+        d["y"] += common * d["X"][:, INERTIALS]
+    grams = [np.column_stack([d["E"], d["X"], d["y"]]) for d in data]
+    joints = [JointGram(g.index, (A.T @ A)[None], GROUPS, np.array([ROWS]))
+              for g, A in zip(space.joints, grams, strict=True)]  # fmt: skip
+    space, hyper, chosen = dataclasses.replace(space, joints=tuple(joints)), (SETTING, SETTING), (0, 2)
+    values = {frozenset(chosen): (space.log_evidence(chosen, hyper), hyper)}
+    each = np.array([[density(space, data, chosen, hyper, w, common=c) for w in WIDTHS] for c in (0.0, 1.0)])
+    without, scaled = np.logaddexp.reduce(each + LOG_PRIOR, axis=1)
+    counted = beside_scale(space, values)
+    assert counted.keys() == {frozenset(chosen), frozenset({*chosen, len(space.candidates)})}
+    odds = counted[frozenset({*chosen, len(space.candidates)})] - counted[frozenset(chosen)]
+    assert odds == pytest.approx(scaled - without + np.log(settings.RARE))
+    assert odds > 10.0 if common else odds < 0.0
+    assert counted[frozenset(chosen)] - values[frozenset(chosen)][0] == pytest.approx(without - scaled)
 
 
 def test_copies_of_a_delay_are_one_shape():
@@ -308,97 +229,6 @@ def test_settings_that_are_settled_have_no_better_neighbour_one_step_away(silent
                 if low <= trial[axis] < high:
                     other = tuple(tuple(trial) if i == j else s for i, s in enumerate(hyper))
                     assert space.log_evidence((0,), other) <= value + 2e-3
-
-
-@pytest.mark.parametrize("true", [(), (0,), (1, 6), (0, 2, 5)])
-def test_the_search_finds_what_was_planted_and_is_sure_of_it(true):
-    space, _ = planted(5, dict.fromkeys(true, 2.0))
-    search = Search(space, ((0, 0, 0, ONE),) * 2)
-    assert search.run() == true
-    sure = probabilities(space.candidates, {s: v for s, (v, _) in search.visited.items()})
-    for c, candidate in enumerate(space.candidates):
-        p = sure.get((candidate.slug, candidate.joints), 0.0)
-        assert p > 0.99 if c in true else p < 0.3, (candidate.slug, candidate.joints, p)
-
-
-def test_a_member_that_moves_nothing_is_removed_though_the_set_without_it_was_judged_by_worse_sizes():
-    space, _ = planted(5, {2: 2.0})
-    worse = ((6, 6, 6, len(LEVELS) - 1),) * 2
-    search = Search(space, ((0, 0, 0, ONE),) * 2)
-    search.visited[frozenset({2})] = space.log_evidence((2,), worse), worse
-    assert search.visited[frozenset({2})][0] < search.judged((1, 2), search.start) - 1.0
-    assert search.run((1, 2)) == (2,)
-
-
-def test_an_effect_of_the_whole_arm_is_judged_though_others_look_better_before_the_noise_is_fitted_anew(monkeypatch):
-    space, _ = planted(0, {2: 5.0})
-    slugs = ("gravity_tilt", "payload", "external_wrench", "contact")
-    whole = [dataclasses.replace(c, effect=CATALOGUE[s], joints=(0, 1))
-             for c, s in zip(space.candidates, slugs, strict=False)]  # fmt: skip
-    space = dataclasses.replace(space, candidates=(*whole, *space.candidates[len(whole) :]))
-    search = Search(space, (SETTING, SETTING))
-    monkeypatch.setattr(search, "_scored", lambda _, joint: [(0.0, i) for i in (0, 1, 3, 2)] if joint == 2 else [])
-    assert 2 in search.run((4,))
-
-
-def test_an_effect_of_the_whole_arm_is_added_with_another_where_neither_is_worth_it_alone(monkeypatch):
-    """A push beside which a rotor drowns: 2 is the push, 3 and 7 are rotors."""
-    space, _ = planted(0, {})
-    search = Search(space, (SETTING, SETTING))
-    worth = {frozenset({4}): 0.0, frozenset({4, 2, 3}): 5.0}
-
-    def judged(chosen, hyper, joints=None):
-        search.visited.setdefault(frozenset(chosen), (worth.get(frozenset(chosen), -1.0), hyper))
-        return search.visited[frozenset(chosen)][0]
-
-    monkeypatch.setattr(search, "judged", judged)
-    monkeypatch.setattr(search, "_scored", lambda _, joint: [(0.0, [3, 7, 2][joint])])
-    judged((4,), search.start)
-    assert search._added(frozenset({4})) == {4, 2, 3}
-
-
-def test_what_a_search_holds_is_in_every_set_it_returns():
-    """Two laws that are not there, one of which is held; what is there is found beside it."""
-    space, _ = planted(5, {2: 2.0})
-    held = frozenset({(space.candidates[0].slug, (0,))})
-    free, _, every = selected(space, (0, 1))
-    best, _, sets = selected(space, (0, 1), held=held)
-    assert free == (2,) and best == (0, 2)
-    assert all(0 in chosen for chosen in sets) and frozenset(best) in sets and not all(0 in chosen for chosen in every)
-
-
-def test_ordinary_friction_is_stated_where_one_rare_effect_explains_nearly_as_much():
-    """A wrong torque constant and a discrepancy like friction may be nearly as probable as friction itself."""
-    space, _ = planted(2, {})
-    friction, offset, rotor = (0, 1), (2,), (0, 3)
-    hyper = (SETTING,) * 2
-    stated = lambda best, other: named(space, best, hyper, {frozenset(best): 0.0, frozenset(other): -1.9})[0]  # noqa: E731
-    assert stated(friction, offset) == friction and stated(offset, friction) == friction
-    assert stated(rotor, offset) == offset and stated(offset, rotor) == offset  # one rare effect each
-
-
-def test_amplitudes_that_are_not_admissible_make_a_set_impossible():
-    space, _ = planted(6, {0: 2.0})
-    lowest = space.lowest.copy()
-    lowest[0] = 10.0
-    bounded = dataclasses.replace(space, lowest=lowest)
-    assert bounded.log_evidence((0,), (SETTING, SETTING)) == -np.inf
-    assert gains(bounded, (), (SETTING, SETTING), np.array([0]))[0] == -np.inf
-    assert 0 not in Search(bounded, (SETTING, SETTING)).run()
-
-
-def test_without_a_member_that_held_another_ones_shape_in_place_that_one_takes_another_shape():
-    """Columns 4 and 5 are shapes of one law, at which its amplitude must be large, or may be anything."""
-    space, _ = planted(6, {0: 2.0, 4: 2.0})
-    candidates, lowest = list(space.candidates), space.lowest.copy()
-    for k in (4, 5):
-        candidates[k] = dataclasses.replace(candidates[4], shape=np.array([float(k)]), columns=np.array([k]))
-    lowest[4] = 10.0
-    space = dataclasses.replace(space, candidates=tuple(candidates), lowest=lowest)
-    hyper = (SETTING, SETTING)
-    assert space.log_evidence((0, 4), hyper) == -np.inf
-    assert reshaped(space, (0, 4), hyper) == (0, 5) and reshaped(space, (0, 5), hyper) == (0, 5)
-    assert 4 not in Search(space, hyper).run((0, 4))
 
 
 def test_the_prior_of_the_sizes_is_a_half_cauchy_distribution():
