@@ -60,6 +60,16 @@ def with_payload(space: Space) -> Space:
     )
 
 
+def with_first_common(space: Space, data: list[dict[str, np.ndarray]], size: float) -> Space:
+    """The same space with so much of the first of the common nuisances in the torque, of `data` too."""
+    joints = []
+    for g, d in zip(space.joints, data, strict=True):
+        d["y"] = d["y"] + size * d["X"][:, INERTIALS]
+        A = np.column_stack([d["E"], d["X"], d["y"]])
+        joints.append(JointGram(g.index, (A.T @ A)[None], GROUPS, np.array([ROWS])))
+    return dataclasses.replace(space, joints=tuple(joints))
+
+
 def density(
     space: Space, data: list[dict[str, np.ndarray]], chosen: tuple[int, ...], hyper, width: float, tied: float = 1.0,
     common: float = 1.0,

@@ -14,6 +14,7 @@ from helpers_selection import (
     dense_posterior,
     density,
     planted,
+    with_first_common,
     with_payload,
 )
 from scipy import integrate, signal, stats
@@ -113,6 +114,23 @@ def test_screening_says_of_a_payload_what_the_evidence_says_at_the_width_of_the_
     np.testing.assert_allclose(gains(space, (2,), hyper, np.array([0])), expected, atol=1e-6)
 
 
+def test_screening_of_an_effect_that_shifts_a_channel_sums_over_delays_that_are_smaller_beside_it():
+    space, data = planted(2, {0: 6.0})
+    skew = dataclasses.replace(space.candidates[0], effect=CATALOGUE["channel_skew"])
+    # A delay of the instrument that is far beyond what is usual.
+    space = with_first_common(dataclasses.replace(space, candidates=(skew, *space.candidates[1:])), data, 8.0)
+    space, hyper, chosen = dataclasses.replace(space, delays=COMMON), (SETTING, SETTING), (2,)
+    of = lambda s, width: np.array([density(space, data, s, hyper, width, common=w) for w in WIDTHS])  # noqa: E731
+    every = np.array([of(chosen, w) + p for w, p in zip(WIDTHS, LOG_PRIOR, strict=True)]) + LOG_PRIOR
+    likely = np.logaddexp.reduce(every, axis=0) - np.logaddexp.reduce(every, axis=None)
+    width = space.width(chosen, hyper)
+    smaller = np.arange(len(WIDTHS)) <= np.argmax(of(chosen, width) + LOG_PRIOR)
+    added = of((2, 0), width) - of(chosen, width) + likely
+    expected = np.logaddexp.reduce(added[smaller]) + np.log(0.05)
+    np.testing.assert_allclose(gains(space, chosen, hyper, np.array([0])), [expected], atol=1e-8)
+    assert 1 < smaller.sum() < len(WIDTHS)
+
+
 def test_a_row_in_which_a_candidate_says_nothing_has_a_density_of_one_over_its_range():
     bare, _ = planted(2, {2: 1.0})
     silent, span = np.zeros((2, len(bare.candidates))), 5.0  # over the noise at level 1
@@ -153,12 +171,7 @@ def test_functions_of_shared_and_own_columns_have_the_moments_of_a_dense_regress
 @pytest.mark.parametrize("common", [0.0, 30.0])
 def test_a_set_counts_with_a_scale_of_all_torques_and_without_any(common):
     space, data = planted(2, {2: 1.0})
-    for d in data:  # the first of the common nuisances
-        d["y"] += common * d["X"][:, INERTIALS]
-    grams = [np.column_stack([d["E"], d["X"], d["y"]]) for d in data]
-    joints = [JointGram(g.index, (A.T @ A)[None], GROUPS, np.array([ROWS]))
-              for g, A in zip(space.joints, grams, strict=True)]  # fmt: skip
-    space, hyper, chosen = dataclasses.replace(space, joints=tuple(joints)), (SETTING, SETTING), (0, 2)
+    space, hyper, chosen = with_first_common(space, data, common), (SETTING, SETTING), (0, 2)
     values = {frozenset(chosen): (space.log_evidence(chosen, hyper), hyper)}
     each = np.array([[density(space, data, chosen, hyper, w, common=c) for w in WIDTHS] for c in (0.0, 1.0)])
     without, scaled = np.logaddexp.reduce(each + LOG_PRIOR, axis=1)

@@ -129,13 +129,16 @@ def test_a_wall_is_found_where_it_stands_by_an_arm_that_feels_all_directions():
     assert found["position"] == pytest.approx(wall["position"], abs=2e-3)
 
 
+def logged_late(recordings, late):
+    """The recordings with the torque of each joint logged late by so many seconds, shape (n,)."""
+    behind = lambda r: np.stack([np.interp(r.t - d, r.t, x) for d, x in zip(late, r.tau.T, strict=True)], axis=1)  # noqa: E731
+    return [dataclasses.replace(r, tau=behind(r)) for r in recordings]
+
+
 @pytest.mark.parametrize("late", [0.006, -0.009])
 def test_a_torque_channel_out_of_step_is_named_and_corrected(late):
     robot, case = machine(6, 3, 0.3)
-    behind = lambda r: np.interp(r.t - late, r.t, r.tau[:, 1])  # noqa: E731
-    skewed = [dataclasses.replace(r, tau=np.stack([r.tau[:, 0], behind(r), r.tau[:, 2]], axis=1))
-              for r in case.recordings]  # fmt: skip
-    diagnosis = diagnose(robot, skewed).diagnosis.to_json()
+    diagnosis = diagnose(robot, logged_late(case.recordings, (0.0, late, 0.0))).diagnosis.to_json()
     (finding,) = diagnosis["findings"]
     assert finding["joints"] == [robot.joint_names[1]]
     if late < 0.0:  # torque logged early is what a lagging drive's log looks like at slow motion
@@ -151,8 +154,7 @@ def test_a_torque_channel_out_of_step_is_named_and_corrected(late):
 def test_torque_channels_that_are_all_a_little_late_are_named_each_with_its_delay():
     robot, case = machine(6, 3, 0.3)
     late = (0.002, 0.003, 0.004)
-    behind = lambda r: np.stack([np.interp(r.t - d, r.t, x) for d, x in zip(late, r.tau.T, strict=True)], axis=1)  # noqa: E731
-    diagnosis = diagnose(robot, [dataclasses.replace(r, tau=behind(r)) for r in case.recordings]).diagnosis
+    diagnosis = diagnose(robot, logged_late(case.recordings, late)).diagnosis
     assert {f.effect for f in diagnosis.findings} == {"channel_skew"}
     named = {f.joints[0]: f.parameters["delay"].value for f in diagnosis.findings}
     assert named == pytest.approx(dict(zip(robot.joint_names, np.negative(late), strict=True)), abs=3e-4)
@@ -161,8 +163,7 @@ def test_torque_channels_that_are_all_a_little_late_are_named_each_with_its_dela
 def test_a_log_whose_channels_are_all_out_of_step_is_no_lag_of_drives():
     robot, case = machine(9, 5, 0.0)
     late = np.array([0.006, 0.004, 0.0, 0.005, 0.003])
-    behind = lambda r: np.stack([np.interp(r.t - d, r.t, x) for d, x in zip(late, r.tau.T, strict=True)], axis=1)  # noqa: E731
-    diagnosis = diagnose(robot, [dataclasses.replace(r, tau=behind(r)) for r in case.recordings]).diagnosis
+    diagnosis = diagnose(robot, logged_late(case.recordings, late)).diagnosis
     assert {(f.effect, *f.joints) for f in diagnosis.findings} == {
         ("channel_skew", name) for name, d in zip(robot.joint_names, late, strict=True) if d > 0.0
     }

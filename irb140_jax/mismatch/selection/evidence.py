@@ -233,9 +233,12 @@ class Space:
         return np.where(unknown.any(axis=0), self._of_widths(chosen, hyper)[0] @ unknown, 1.0)
 
     def priors_by_delays(self, chosen: Sequence[int], hyper: Hyper) -> list[tuple[np.ndarray, float]]:
-        """Prior widths of a set's columns at each width of the delays up to the most probable, and its log probability.
+        """Prior widths of a set's columns, shape (k,), at each width of the delays up to the most probable one.
 
         Without a late channel that an effect accounts for, the others' delays may well be smaller.
+
+        Returns:
+            The widths, and the log probability of that of the delays; nothing where there are no delays.
         """
         prior, mine = self.prior(chosen, hyper), self._of_unknown_width(chosen)[1]
         best, log_probability = self._of_widths(chosen, hyper)

@@ -195,8 +195,8 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     search = partial(selected, without_barred, chosen, every_move=start.whole)
     best, hyper, visited = search()
     falling = partial(with_falling_friction, space, data, extra[0], given.scales)
-    in_time = partial(with_late_channels, without_barred, held=at.rests_on if at else frozenset())
-    found, found_hyper, late = in_time(best, hyper)
+    shifting = partial(with_late_channels, without_barred, held=at.rests_on if at else frozenset())
+    found, found_hyper, late = shifting(best, hyper)
     # Slopes at an explanation say nothing of one without what it rests on: under leaning gravity that nothing is named
     # for, inertials can stand for the tilt.
     from_nominal: Sets = {}
@@ -206,7 +206,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         if not at.rests_on <= _sites(free.data, free.chosen):
             return free, last
         best, hyper, visited = search(held=at.rests_on)
-        found, found_hyper, late = in_time(best, hyper)
+        found, found_hyper, late = shifting(best, hyper)
         from_nominal, late_from_nominal = free.averaged, free.late
     found, found_hyper, falls = falling(found, found_hyper)
     last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
@@ -223,7 +223,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         every = named((*space.candidates, scale), averaged)
         stated = tuple(i for i in every if i < len(space.candidates))
         scale_found = stated != every
-        found, found_hyper, late = in_time(stated, hyper if stated == best else settled(space, stated, hyper)[1])
+        found, found_hyper, late = shifting(stated, hyper if stated == best else settled(space, stated, hyper)[1])
         found, found_hyper, falls = falling(found, found_hyper)
         late = {site: late_from_nominal.get(site, why) for site, why in late.items()}
     for joint in joints:

@@ -1,7 +1,7 @@
 """Sizes of the discrepancy and noise levels that are best for a set, and the sum over its members' shapes."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import linalg, special
@@ -10,7 +10,7 @@ from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.gaussian import root, with_prior
 from irb140_jax.mismatch.regression.gram import LEVELS, JointHyper
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
-from irb140_jax.mismatch.selection.screening import gains
+from irb140_jax.mismatch.selection.screening import gains, reshaped
 
 LEAST = 1e-3  # nats that a step of a size or a level must gain
 
@@ -33,6 +33,30 @@ def settled(
         if at_best == len(joints):
             break
     return space.log_evidence(chosen, hyper) + over_shapes(space, chosen, hyper), hyper
+
+
+def possible(
+    space: Space, chosen: tuple[int, ...], judge: Callable[[tuple[int, ...]], tuple[float, Hyper]], *,
+    fewer: bool = False,
+) -> tuple[int, ...]:  # fmt: skip
+    """A set, with other shapes of members whose amplitudes can't be at theirs; itself where that is of no use.
+
+    Args:
+        space: What may be in a set.
+        chosen: The set.
+        judge: Log posterior of a set, sizes and levels: see `settled`.
+        fewer: Whether members without any possible shape are left out.
+    """
+    seen = set[tuple[int, ...]]()
+    while not np.isfinite((judged := judge(chosen))[0]):
+        seen.add(chosen)
+        other = reshaped(space, chosen, judged[1])
+        if other in seen and fewer:
+            other = tuple(i for i in chosen if i not in space.inadmissible(chosen, judged[1]))
+        if other in seen:
+            break
+        chosen = other
+    return chosen
 
 
 def over_shapes(space: Space, chosen: Sequence[int], hyper: Hyper) -> float:

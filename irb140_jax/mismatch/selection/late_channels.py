@@ -6,6 +6,7 @@ always tell.  What is certain is that the channel is late.  Where it is, that is
 """
 
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -16,8 +17,8 @@ from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
 from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
-from irb140_jax.mismatch.selection.hyperparameters import settled
-from irb140_jax.mismatch.selection.screening import gains, reshaped
+from irb140_jax.mismatch.selection.hyperparameters import possible, settled
+from irb140_jax.mismatch.selection.screening import gains
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +54,13 @@ class Delays:
 
 
 def delays_beside(space: Space, chosen: Sequence[int], hyper: Hyper) -> Delays:
-    """What a set leaves to the instrument's own delays: that of all channels and that of each joint's."""
+    """What a set leaves to the instrument's own delays: the sum of that of all channels and that of each joint's.
+
+    Args:
+        space: What may be in a set.
+        chosen: The set.
+        hyper: Sizes and levels beside it.
+    """
     mean, cov = space.posterior(chosen, hyper)
     at = np.arange(space.offset - space.delays, space.offset)
     weights = np.zeros((len(at), len(mean)))
@@ -103,20 +110,27 @@ def with_late_channels(
 def _most_probable(
     space: Space, base: tuple[int, ...], hyper: Hyper, options: list[dict[str, int]]
 ) -> tuple[tuple[int, ...], dict[int, dict[str, float]]]:
-    """A set with the most probable effect of each channel, and by joint how probable each effect is, others given.
+    """A set with the most probable effect of each channel, and how probable each effect is, the others given.
 
     From one kind for all channels, where one suits them all, one channel after another.
+
+    Args:
+        space: What may be in a set.
+        base: The rest of the set.
+        hyper: Sizes and levels beside it.
+        options: Of each channel the candidate of each effect, by the effect's name, the best first.
+
+    Returns:
+        The set, `base` where none is possible; and by joint and effect the probability.
     """
-    known: dict[tuple[int, ...], tuple[float, tuple[int, ...]]] = {}
+
+    @functools.cache
+    def judge(whole: tuple[int, ...]) -> tuple[float, Hyper]:
+        return settled(space, whole, hyper)
 
     def judged(members: tuple[int, ...]) -> tuple[float, tuple[int, ...]]:
-        if members not in known:
-            tried, now = set[tuple[int, ...]](), tuple(sorted((*base, *members)))
-            while now not in tried and not np.isfinite(value := settled(space, now, hyper)[0]):
-                tried.add(now)
-                now = reshaped(space, now, hyper)
-            known[members] = value, now
-        return known[members]
+        whole = possible(space, tuple(sorted((*base, *members))), judge)
+        return judge(whole)[0], whole
 
     each = [[*of_joint.values()] for of_joint in options]
     exchanged = lambda members, at: [(*members[:at], i, *members[at + 1 :]) for i in each[at]]  # noqa: E731

@@ -9,8 +9,8 @@ from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
-from irb140_jax.mismatch.selection.hyperparameters import settled
-from irb140_jax.mismatch.selection.screening import gains, reshaped
+from irb140_jax.mismatch.selection.hyperparameters import possible, settled
+from irb140_jax.mismatch.selection.screening import gains
 
 BEST = 3  # candidates of different kinds that a screening passes on to be judged in full
 LEAST = 1e-2  # nats that a move must gain
@@ -95,17 +95,12 @@ class Search:
         self, chosen: frozenset[int], hyper: Hyper, joints: Iterable[int] | None
     ) -> frozenset[int]:
         """A set, judged, with other shapes of members whose amplitudes can't be at theirs, or without those members."""
-        seen: set[frozenset[int]] = set()
-        while not np.isfinite(self.judged(chosen, hyper, joints)):
-            seen.add(chosen)
-            members, at = tuple(sorted(chosen)), self.visited[chosen][1]
-            other = frozenset(reshaped(self.space, members, at))
-            if other in seen:
-                other = chosen - set(self.space.inadmissible(members, at))
-            if other in seen:
-                break
-            chosen = other
-        return chosen
+
+        def judge(members: tuple[int, ...]) -> tuple[float, Hyper]:
+            self.judged(members, hyper, joints)
+            return self.visited[frozenset(members)]
+
+        return frozenset(possible(self.space, tuple(sorted(chosen)), judge, fewer=True))
 
     def screened(
         self, chosen: frozenset[int], joint: int, most: int | None = BEST, least: float = -np.inf
