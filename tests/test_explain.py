@@ -94,7 +94,7 @@ def test_what_the_last_search_adds_is_settled_too(monkeypatch):
             return real(space, chosen, every_move=every_move)
         ordinary = tuple(i for i, c in enumerate(space.candidates) if c.effect.prior.ordinary)
         value, hyper = settled(space, ordinary, (START,) * len(space.joints))
-        return ordinary, hyper, {frozenset(ordinary): value}
+        return ordinary, hyper, {frozenset(ordinary): (value, hyper)}
 
     monkeypatch.setattr(loop, "selected", blind_at_first)
     ex, _ = explained.__wrapped__(6.0)
@@ -107,13 +107,13 @@ def test_a_shape_that_is_dropped_twice_when_refined_is_not_searched_again_but_or
     real, named = loop.selected, []
 
     def drops_all(space, chosen=(), *, every_move=True):
-        best, hyper, sets = real(space, chosen, every_move=every_move)
+        best, hyper, visited = real(space, chosen, every_move=every_move)
         stretch = {i for i in best if space.candidates[i].slug == "position_dependent_friction"}
         if every_move:
             named.append(bool(stretch))
-            return best, hyper, sets
+            return best, hyper, visited
         value, hyper = settled(space, (), (START,) * len(space.joints))
-        return (), hyper, {frozenset(): value}
+        return (), hyper, {frozenset(): (value, hyper)}
 
     monkeypatch.setattr(loop, "selected", drops_all)
     ex, _ = explained.__wrapped__(6.0)

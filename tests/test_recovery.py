@@ -171,6 +171,12 @@ def test_a_log_whose_channels_are_all_out_of_step_is_no_lag_of_drives():
         assert f.parameters["delay"].value == pytest.approx(-late[robot.joint_names.index(f.joints[0])], abs=3e-4)
 
 
+def test_a_log_that_is_late_as_a_whole_with_one_channel_later_still_has_one_delay():
+    robot, case = machine(9, 5, 0.0)
+    (finding,) = diagnose(robot, logged_late(case.recordings, (0.016, 0.016, 0.032, 0.016, 0.016))).diagnosis.findings
+    assert (finding.effect, finding.joints) == ("time_delay", robot.joint_names)
+
+
 def test_the_corrected_model_predicts_other_moves_of_the_machine():
     case, result = diagnosed("stribeck_friction")
     hidden = {k: v["value"] for k, v in case.truth["effects"][0]["parameters"].items()}

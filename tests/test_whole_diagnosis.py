@@ -6,9 +6,9 @@ from testbed import runner, scoring
 from testbed.cases import make
 
 
-def said(index: int) -> dict:
-    """A case of the draw that may be looked at, as it is stored."""
-    line = json.loads(json.dumps(runner.compact(runner.judged(make("work", index)))))
+def said(index: int, draw: str = "work", commit: str = "") -> dict:
+    """A case of the draw that may be looked at, or of one that is done with, as it is stored."""
+    line = json.loads(json.dumps(runner.compact(runner.judged(make(draw, index, commit)))))
     assert line["diagnosis"], line
     return line
 
@@ -38,6 +38,13 @@ def test_friction_that_falls_as_the_speed_rises_is_named_whatever_the_form_of_it
     # No other law holds the joint's dry friction, and what else is named there has odds of its own.
     assert not any(f["effect"] == "coulomb_friction" and f["joints"] == ["j2"] for f in line["diagnosis"]["findings"])
     assert all(f["evidence"]["log_odds"] > 0.0 for f in line["diagnosis"]["findings"])
+
+
+def test_a_torque_constant_does_not_stand_for_friction_that_is_most_of_a_joints_torque():
+    line = said(32, "final", "af4dedc")  # a slide whose friction is many times what its links need
+    named = {(f["effect"], *f["joints"]) for f in line["diagnosis"]["findings"]}
+    assert {("position_dependent_friction", "j1"), ("viscous_friction", "j2")} <= named
+    assert not scoring.false_names(line)
 
 
 def test_play_is_found_by_its_blows_which_no_repair_takes_for_spikes():

@@ -169,9 +169,12 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     at, band, turn = start.at, given.band, start.round
     lib, chosen = start.searched()
     given.progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
-    each = [*zip(start.along, start.loads, strict=True)]
+    # Friction is stated in the torque that is logged: in the column of a wrong torque constant, too, it would count
+    # twice, and in the place of friction that column would stand for what the round before found of it.
+    each = [(r, x and x._replace(total=x.load)) for r, x in zip(start.along, start.loads, strict=True)]
     rows = judged([bare_stretch(lib, r, i, band, given.factor, load, at) for i, (r, load) in enumerate(each)])
-    known = [(r.nominal, r.nominal) if x is None else (x.load, x.total) for r, x in each]
+    known = [(r.nominal, r.nominal) if x is None else (x.load, x.total)
+             for (r, _), x in zip(each, start.loads, strict=True)]  # fmt: skip
     extra = nuisances(lib.robot, start.along, known, band, given.scales, at)
     noise = start.noise or _first_noise(lib, rows, start.along, band, given.uncertainty, extra)
     columns = [partial(candidate_rows, lib, r, i, band, load, at) for i, (r, load) in enumerate(each)]

@@ -91,13 +91,24 @@ def with_late_channels(
     if not space.delays or any(candidates[i].effect.place.everywhere for i in timed):
         return best, hyper, {}
     base = tuple(i for i in best if i not in timed)
-    beside = settled(space, base, hyper)[1] if timed else hyper
+    value, beside = settled(space, base, hyper)
     found = delays_beside(space, base, beside)
     certain = found.notable & (found.log_odds >= np.log(settings.NAMED / (1.0 - settings.NAMED)))
     if not certain.any():
         return best, hyper, {}
-    options = [_shifting(space, base, beside, int(j), held) for j in np.flatnonzero(certain)]
-    chosen, worth = _most_probable(space, base, beside, [of_joint for of_joint in options if of_joint])
+    options = [_shifting(space, base, beside, (int(j),), held) for j in np.flatnonzero(certain)]
+    options = [of_joint for of_joint in options if of_joint]
+    every = tuple(range(len(certain)))
+    if len(options) == len(every) > 1 and (of_all := _shifting(space, base, beside, every, held)):
+        # One delay of all channels, or delays of their own that happen to be long: with the latter nothing is named.
+        slug, i = next(iter(of_all.items()))
+        stated = tuple(sorted((*base, i)))
+        of_set, with_it = settled(space, stated, beside)
+        if of_set > value:
+            rival = next(iter(options[0])), every
+            whole = Late(float(found.log_odds.min()), {rival: float(special.expit(value - of_set))})
+            return stated, with_it, {(slug, every): whole}
+    chosen, worth = _most_probable(space, base, beside, options)
     late: dict[Site, Late] = {}
     for c in (candidates[i] for i in chosen if space.late[i]):
         rivals = {(slug, c.joints): p for slug, p in worth[c.joints[0]].items() if slug != c.slug}
@@ -149,9 +160,11 @@ def _most_probable(
     return chosen, worth
 
 
-def _shifting(space: Space, base: tuple[int, ...], hyper: Hyper, j: int, held: frozenset[Site]) -> dict[str, int]:
-    """Effects that shift one channel in time, by name: the candidate with the best shape, the best effect first."""
-    which = [i for i, c in enumerate(space.candidates) if space.late[i] and c.joints == (j,)]
+def _shifting(
+    space: Space, base: tuple[int, ...], hyper: Hyper, joints: tuple[int, ...], held: frozenset[Site]
+) -> dict[str, int]:
+    """Effects that shift some channels in time, by name: the candidate with the best shape, the best effect first."""
+    which = [i for i, c in enumerate(space.candidates) if space.late[i] and c.joints == joints]
     kept = [i for i in which if site_of(space.candidates[i]) in held]
     out: dict[str, tuple[float, int]] = {}
     for slug, i in {space.candidates[i].slug: i for i in reversed(kept or which)}.items():
