@@ -4,7 +4,7 @@ A set whose inertials and effects explain the torque only if all of it is scaled
 finding with the prior odds of a rare effect.  So each set counts twice: with that finding, and without any scale.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def scale_of(space: Space) -> Candidate:
     return Candidate(GAIN, tuple(range(len(space.joints))), nothing, nothing.astype(int), (), nothing, nothing)
 
 
-def scale_log_odds(space: Space, chosen: frozenset[int] | tuple[int, ...], hyper: Hyper) -> float:
+def scale_log_odds(space: Space, chosen: Collection[int], hyper: Hyper) -> float:
     """Log odds that all torques are logged too large or too small by one factor, if a set is true."""
     return space.torque_scale_odds(tuple(sorted(chosen)), hyper) + float(np.log(settings.RARE))
 
@@ -35,7 +35,7 @@ def beside_scale(space: Space, visited: Mapping[frozenset[int], tuple[float, Hyp
     """
     out: dict[frozenset[int], float] = {}
     for chosen, value in near_best({s: v for s, (v, _) in visited.items()}).items():
-        rare = float(np.log(settings.RARE))
-        out[chosen] = value + rare - scale_log_odds(space, chosen, visited[chosen][1])
-        out[chosen | {len(space.candidates)}] = value + rare
+        scaled = value + float(np.log(settings.RARE))
+        out[chosen | {len(space.candidates)}] = scaled
+        out[chosen] = scaled - scale_log_odds(space, chosen, visited[chosen][1])
     return out
