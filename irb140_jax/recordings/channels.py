@@ -13,7 +13,7 @@ from irb140_jax.effects.encoder_offset import LARGEST
 from irb140_jax.recordings.doubt import Doubt
 from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.torque_shape import BADLY, BETTER, CHANGED, WELL, explained
+from irb140_jax.recordings.torque_shape import BADLY, BETTER, CHANGED, MIN_SHARE, WELL, explained, ratio_to_model
 from irb140_jax.recordings.torque_units import unit_doubts
 from irb140_jax.recordings.torques import Torques, nominal_torques
 from irb140_jax.robot import Robot
@@ -73,10 +73,12 @@ def _hypotheses(
         turned = seen._replace(q=sign * seen.q, qd=sign * seen.qd, qdd=sign * seen.qdd)
         other = again(turned.q, turned.qd, turned.qdd)
         tau, q = f"tau.{names[j]}", f"q.{names[j]}"
-        yield 0.5, Doubt(
-            "reversed torque", (j,), f"column {tau} of the wrong sign: the reversed torque is what the model and "
-            "friction would need", f"map it with --columns and [scale] \"{tau}\" = -1", {tau: -1.0},
-        ), explained(seen, model, judged, sign * seen.tau)  # fmt: skip
+        # A torque many times that of the model is of inertials that are wrong: they may have either sign.
+        if MIN_SHARE * ratio_to_model(seen._replace(tau=sign * seen.tau), model, j) < 1.0:
+            yield 0.5, Doubt(
+                "reversed torque", (j,), f"column {tau} of the wrong sign: the reversed torque is what the model and "
+                "friction would need", f"map it with --columns and [scale] \"{tau}\" = -1", {tau: -1.0},
+            ), explained(seen, model, judged, sign * seen.tau)  # fmt: skip
         yield 1.0, Doubt(
             "reversed position", (j,), f"column {q} of the wrong sign: with it reversed the model explains the torque",
             f"map it with --columns and [scale] \"{q}\" = -1", {q: -1.0},

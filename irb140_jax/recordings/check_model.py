@@ -19,6 +19,7 @@ from irb140_jax.recordings.glance import Glance
 from irb140_jax.recordings.hidden_payload import explained_by_a_payload
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.torque_shape import (
+    MIN_SHARE,
     explained,
     friction,
     lateness,
@@ -32,7 +33,6 @@ from irb140_jax.robot import Robot
 FAR = 20.0  # rad; three turns: beyond the reach of any joint that has limits
 CERTAIN, NONE = 0.7, 0.15  # shares of a torque's variance that count as explained and as not explained
 LONGEST_DELAY = 2.0 * max(HALVES)  # s; a diagnosis finds shorter ones itself
-MIN_SHARE = 0.4  # of the model's torque that a joint must log to have a sign or a place worth judging
 
 
 def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Recording:

@@ -9,6 +9,7 @@ from irb140_jax.recordings.torques import Torques
 WELL, BADLY = 0.9, 0.6  # shares of a torque's variance that the model explains under a true hypothesis, and as given
 BETTER = 5.0  # times less that is left unexplained under a true hypothesis
 CHANGED = 0.05  # of the share by which a joint is concerned by a hypothesis
+MIN_SHARE = 0.4  # of the model's torque that a joint must log to have a sign or a place worth judging
 LATEST = 0.4  # s by which a torque may come late
 
 
