@@ -460,3 +460,8 @@ def test_the_irb_140_with_random_physics_left_out_passes(tmp_path, seed):
 def test_a_torque_of_wrong_inertials_that_has_the_sign_of_its_own_is_not_refused(tmp_path):
     """The model's torque of joint 4 is a fortieth of what is logged, and the poses are few: it looks turned round."""
     runner.read_case(make("final", 39, "06588fc"), tmp_path)
+
+
+def test_a_centre_of_mass_that_looks_like_another_zero_is_told_and_not_refused(tmp_path):
+    _, recordings, _ = runner.read_case(make("final", 53, "06588fc"), tmp_path)
+    assert any("the zero of q.j3" in note and "payload" in note for r in recordings for note in r.notes)

@@ -9,13 +9,15 @@ from scipy.optimize import nnls
 
 from irb140_jax.recordings.doubt import Doubt
 from irb140_jax.recordings.glance import Glance
-from irb140_jax.recordings.torque_shape import terms
+from irb140_jax.recordings.torque_shape import BETTER, terms
 from irb140_jax.recordings.torques import Torques, nominal_torques
 from irb140_jax.robot import Robot, with_phi
 
 
 def explained_by_a_payload(doubt: Doubt, seen: Glance, robot: Robot, model: Torques, judged: np.ndarray) -> bool:
-    """Whether a payload explains the torque as well as a mended channel does.
+    """Whether a payload explains the torque as well as a mended channel does, or nearly as well as another zero.
+
+    Another centre of mass of the last link turns gravity as another zero of its joint does, but for the inertia.
 
     Args:
         doubt: What is taken for wrong; where its `explained` is None, such as for units, no payload is asked for.
@@ -28,7 +30,8 @@ def explained_by_a_payload(doubt: Doubt, seen: Glance, robot: Robot, model: Torq
         return False
     both = judged & np.isfinite(doubt.explained)
     left = min(np.sum(1.0 - shares[both]) for shares in _explained_with_payload(seen, robot, model, judged))
-    return bool(left < np.sum(1.0 - doubt.explained[both]))
+    nearly = BETTER if doubt.kind == "zero" else 1.0
+    return bool(left < nearly * np.sum(1.0 - doubt.explained[both]))
 
 
 def _explained_with_payload(seen: Glance, robot: Robot, model: Torques, judged: np.ndarray) -> list[np.ndarray]:
