@@ -1,11 +1,15 @@
 """Recordings made with MuJoCo's own inverse dynamics, to be spoiled by the tests."""
 
+import pathlib
+
 import mujoco
 import numpy as np
 import pandas as pd
+import pytest
 
 import irb140_jax as irb
-from irb140_jax.recordings import Recording
+from irb140_jax.errors import RecordingError
+from irb140_jax.recordings import Recording, read_recording, write_recording
 from irb140_jax.robot import robot_from_model
 
 ARM = """
@@ -79,3 +83,17 @@ def recording(
 
 def frame(made: Recording) -> pd.DataFrame:
     return pd.DataFrame(irb.recordings.recording_columns(made))
+
+
+def read_of(recording: Recording, robot: irb.Robot, folder: pathlib.Path) -> Recording:
+    """A recording as it is read from a file."""
+    return read_recording(write_recording(recording, folder / "log.parquet"), robot)
+
+
+def refusal(recording: Recording, robot: irb.Robot, folder: pathlib.Path) -> str:
+    """Why a recording is refused: one line that names its file."""
+    with pytest.raises(RecordingError) as caught:
+        read_of(recording, robot, folder)
+    message = str(caught.value)
+    assert "\n" not in message and "log.parquet" in message
+    return message

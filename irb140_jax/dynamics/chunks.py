@@ -11,6 +11,7 @@ from jax import lax
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from irb140_jax.arrays import on_device
 from irb140_jax.compiler import QUICK
 
 # Samples at a time: the intermediate results of so many stay in the second-level cache.
@@ -38,11 +39,11 @@ def in_chunks(kernel: Kernel, given: Any, samples: tuple[Float[Array, "T ..."], 
     size = arrays[0].shape[0]
     pieces = [_piece(kernel, given, [x[k : k + SEGMENT] for x in arrays]) for k in range(0, max(size, 1), SEGMENT)]
     if len(pieces) == 1:
-        return jnp.asarray(pieces[0])
+        return on_device(pieces[0])
     result = np.empty((size, *pieces[0].shape[1:]))
     for k, piece in enumerate(pieces):
         result[k * SEGMENT : (k + 1) * SEGMENT] = piece
-    return jnp.asarray(result)
+    return on_device(result)
 
 
 def sum_of_chunks(kernel: Kernel, given: Any, samples: tuple[Float[Array, "T ..."], ...]) -> Float[Array, "..."]:

@@ -1,10 +1,12 @@
 """Gravity tilt: the base is not level."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from irb140_jax.arrays import on_device
 from irb140_jax.effects.base import Effect
 from irb140_jax.effects.records import Export, Law, Parameter, Place, Prior, all_joints
 
@@ -24,9 +26,10 @@ def _from_physical(values):
 def _in_model(robot, joints, w, shape):
     g = np.asarray(robot.gravity)
     leant = g + np.linalg.norm(g) * np.asarray(w) @ np.asarray(across(robot.gravity))
-    return eqx.tree_at(lambda r: r.gravity, robot, jnp.asarray(leant))
+    return eqx.tree_at(lambda r: r.gravity, robot, on_device(leant))
 
 
+@jax.jit  # as `robot.robot._phi`
 def across(gravity: Float[Array, "3"]) -> Float[Array, "2 3"]:
     """Two unit vectors across gravity, the directions of the two components of the tilt; any two where there is none.
 

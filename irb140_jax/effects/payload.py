@@ -1,8 +1,8 @@
 """Payload: a mass on the last link that is not in the model."""
 
-import jax.numpy as jnp
 import numpy as np
 
+from irb140_jax.arrays import on_device
 from irb140_jax.effects.base import Effect
 from irb140_jax.effects.records import Export, Law, Parameter, Place, Prior, all_joints
 from irb140_jax.robot import about_origin, with_phi
@@ -23,7 +23,7 @@ def _from_physical(values):
 
 
 def _in_model(robot, joints, w, shape):
-    return with_phi(robot, robot.phi.at[-1].add(about_origin(robot.tool_position) @ jnp.asarray(w * SIZES)))
+    return with_phi(robot, robot.phi.at[-1].add(about_origin(robot.tool_position) @ on_device(w * SIZES)))
 
 
 EFFECT = Effect(

@@ -258,7 +258,7 @@ def _explained(
     later = lambda times: data.later(times).smooth  # noqa: E731
     effects = _searched(config, data)
     ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved, later)
-    return dataclasses.replace(without_negligible(ex, data.servo), scaled=ex.scale_found)
+    return without_negligible(ex, data.servo)
 
 
 def _corrected(

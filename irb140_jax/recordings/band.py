@@ -1,11 +1,11 @@
 """In which band of frequencies model and log are compared: where positions carry motion and torque means something."""
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from scipy import ndimage
 
 from irb140_jax import dynamics
+from irb140_jax.arrays import on_device
 from irb140_jax.recordings.condition import Conditioned, condition, even
 from irb140_jax.recordings.low_pass import Band, filtered, kernels
 from irb140_jax.recordings.payload import carrying
@@ -70,10 +70,10 @@ def _coherent_limit(recordings: list[Recording], smooth: list[Conditioned], robo
     f = _frequencies(band)
     spectra = np.zeros((robot.n, len(f), 4, 4), dtype=complex)
     passive = lambda r: (r.stiffness, r.damping, r.frictionloss)  # noqa: E731
-    moving = eqx.tree_at(passive, robot, (jnp.zeros(robot.n),) * 3)
+    moving = eqx.tree_at(passive, robot, (on_device(np.zeros(robot.n)),) * 3)
     for r, alive in zip(smooth, living, strict=True):
         loaded = carrying(moving, r.payload)
-        m = np.asarray(dynamics.inverse_dynamics_batch(loaded, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))
+        m = np.asarray(dynamics.inverse_dynamics_batch(loaded, *(on_device(x) for x in (r.q, r.qd, r.qdd))))
         friction = np.concatenate([r.direction, r.qd], axis=1)
         slow = filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), kernels(SLOW, band.rate)[0])
         for j in np.flatnonzero(alive):

@@ -7,9 +7,9 @@ the links weigh, so that a wrong torque constant can no longer be taken for link
 import dataclasses
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 
+from irb140_jax.arrays import on_device
 from irb140_jax.robot import Robot, about_origin, with_phi
 
 
@@ -32,7 +32,7 @@ def carrying(robot: Robot, payload: Payload | None) -> Robot:
     """The robot with a known body on its tool, or as it is where there is none."""
     if payload is None:
         return robot
-    return with_phi(robot, robot.phi.at[-1].add(jnp.asarray(_inertials(robot, payload, np.zeros(3)))))
+    return with_phi(robot, robot.phi.at[-1].add(on_device(_inertials(robot, payload, np.zeros(3)))))
 
 
 def inertials_per_metre(robot: Robot, payload: Payload) -> np.ndarray:

@@ -3,10 +3,10 @@
 import pathlib
 from collections.abc import Mapping, Sequence
 
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from irb140_jax.arrays import on_device
 from irb140_jax.errors import RobotError
 from irb140_jax.robot.choose import Choice, Wish, choose, scalar_joints
 from irb140_jax.robot.description import Description, description
@@ -134,7 +134,7 @@ def _robot(said: Description, wish: Wish) -> Robot:
     )  # fmt: skip
     refuse_impossible_numbers(fields, names, source)
     return Robot(
-        **{key: jnp.array(value, dtype=float) for key, value in fields.items()},
+        **{key: on_device(value) for key, value in fields.items()},
         joint_names=names,
         is_slide=tuple(int(kind) == int(mujoco.mjtJoint.mjJNT_SLIDE) for kind in model.jnt_type[own]),
         name=_name(model, source),

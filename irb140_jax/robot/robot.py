@@ -156,6 +156,12 @@ def with_phi(robot: Robot, phi: Inertials) -> Robot:
 
     A link of zero mass gets its centre of mass at the frame's origin.
     """
+    where = lambda r: (r.mass, r.com, r.inertia)  # noqa: E731
+    return eqx.tree_at(where, robot, _from_phi(phi))
+
+
+@jax.jit  # as `_phi`
+def _from_phi(phi: Inertials) -> tuple[Array, Array, Array]:
     mass = phi[:, 0]
     com = phi[:, 1:4] / jnp.where(mass == 0.0, 1.0, mass)[:, None]
     rows, cols = jnp.triu_indices(3)
@@ -163,8 +169,7 @@ def with_phi(robot: Robot, phi: Inertials) -> Robot:
     about_origin = upper + jnp.swapaxes(jnp.triu(upper, 1), 1, 2)
     c2 = jnp.sum(com**2, axis=-1)[:, None, None]
     inertia = about_origin - mass[:, None, None] * (c2 * jnp.eye(3) - com[:, :, None] * com[:, None, :])
-    where = lambda r: (r.mass, r.com, r.inertia)  # noqa: E731
-    return eqx.tree_at(where, robot, (mass, com, inertia))
+    return mass, com, inertia
 
 
 @jax.jit  # as `_phi`

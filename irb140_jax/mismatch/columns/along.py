@@ -1,6 +1,7 @@
 """What a robot and every candidate do along a recording: sensitivities and columns."""
 
 import dataclasses
+import itertools
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -14,6 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from irb140_jax import dynamics, kinematics
+from irb140_jax.arrays import on_device
 from irb140_jax.compiler import QUICK
 from irb140_jax.dynamics.chunks import in_chunks
 from irb140_jax.effects import Asked, Motion, RigidBody, Scales
@@ -161,7 +163,7 @@ def seen_by(robot: Robot, along: Prepared) -> Prepared:
 
 
 def _regressor(robot: Robot, r: Conditioned, at: slice) -> np.ndarray:
-    return np.asarray(dynamics.regressor_batch(robot, *(jnp.asarray(x[at]) for x in (r.q, r.qd, r.qdd))))
+    return np.asarray(dynamics.regressor_batch(robot, *(on_device(x[at]) for x in (r.q, r.qd, r.qdd))))
 
 
 PER_SAMPLE = ("by_gravity", "held", "by_q", "by_qd", "mass", "tool", "tool_jacobian")  # of `RigidBody`
@@ -182,7 +184,7 @@ def _sensitivities(robot: Robot, recording: Conditioned, at: slice, last_link: n
     """See `RigidBody`.  Springs of the model pull at the link; rotors and friction are the motor's."""
     q, qd, qdd = recording.q[at], recording.qd[at], recording.qdd[at]
     parts = lambda r: (r.armature, r.damping, r.frictionloss)  # noqa: E731
-    bare, n = eqx.tree_at(parts, robot, (jnp.zeros(robot.n),) * 3), robot.n
+    bare, n = eqx.tree_at(parts, robot, (on_device(np.zeros(robot.n)),) * 3), robot.n
     still, unit, step = np.zeros_like(q), np.eye(n), STEP * np.eye(n)
     # In one call, for one of few samples costs as much as one of many.
     motions = [(q, qd, qdd), (q, still, still), *((q + e, qd, qdd) for e in step), *((q, qd + e, qdd) for e in step)]
@@ -201,18 +203,18 @@ def _sensitivities(robot: Robot, recording: Conditioned, at: slice, last_link: n
 
 def _by_gravity(bare: Robot, q: np.ndarray) -> np.ndarray:
     """Torque per unit of each component of gravity, shape (T, n, 3)."""
-    links, still = eqx.tree_at(lambda r: r.stiffness, bare, jnp.zeros(bare.n)), np.zeros_like(q)
-    pulled = (eqx.tree_at(lambda r: r.gravity, links, jnp.asarray(g)) for g in PULLS)
+    links, still = eqx.tree_at(lambda r: r.stiffness, bare, on_device(np.zeros(bare.n))), np.zeros_like(q)
+    pulled = (eqx.tree_at(lambda r: r.gravity, links, on_device(g)) for g in PULLS)
     return np.stack([_torque(r, q, still, still) for r in pulled], axis=-1) @ np.linalg.inv(PULLS.T)
 
 
 def _torque(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    return np.asarray(dynamics.inverse_dynamics_batch(robot, *(jnp.asarray(x) for x in (q, qd, qdd))))
+    return np.asarray(dynamics.inverse_dynamics_batch(robot, *(on_device(x) for x in (q, qd, qdd))))
 
 
 def tool_along(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Position of the tool in the world, (T, 3), and its velocity per joint speed, (T, n, 3)."""
-    both = np.asarray(in_chunks(_tool_of_chunk, robot, (jnp.asarray(q),)))
+    both = np.asarray(in_chunks(_tool_of_chunk, robot, (on_device(q),)))
     return both[:, 0], both[:, 1:]
 
 
@@ -234,30 +236,56 @@ def columns_along(
         recording: Its number; below 0 where the diagnosis did not see it.
         at: The samples, by default all.
     """
-    r = along.recording
-    nominal = along.nominal
+    at = at or slice(0, len(along.recording.t))
+    out = np.empty((at.stop - at.start, len(lib.entries[0])))
+    for piece in _calls(at):
+        for entries, part in columns_by_effect(lib, along, loads, recording, piece):
+            out[piece.start - at.start : piece.stop - at.start, entries] = part
+    return out
+
+
+def columns_by_effect(
+    lib: Library, along: Prepared, loads: Loads | None, recording: int, at: slice
+) -> Iterator[tuple[slice, np.ndarray]]:
+    """The same, one effect after the other: which of `Library.entries`, and their columns, shape (t, those).
+
+    Args:
+        lib, along, loads, recording: See `columns_along`.
+        at: The samples: not many, for what the rigid body does along them is held.
+    """
+    calls = [(call, *_motion(along, loads, recording, call)) for call in _calls(at)]
+    exact = [slice(call.start - first, call.stop - first) for call, first, _ in calls]
+    # One program for each effect: of all in one, XLA would evaluate parts again and again.
+    every = _ahead(_columns(b[0], b[1], b[2], motion) for b in lib.blocks for _, _, motion in calls)
+    column = 0
+    for _ in lib.blocks:
+        parts = [np.asarray(next(every))[use] for use in exact]
+        part = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        yield slice(column, column + part.shape[1]), part
+        column += part.shape[1]
+
+
+def _calls(at: slice) -> Iterator[slice]:
+    """Some samples, as many at a time as one compiled call makes the columns of."""
+    # Nothing has to be run in before the first.
+    edges = [at.start, *range(max(at.start, RUN_IN) + NEW, at.stop, NEW), at.stop]
+    return (slice(first, last) for first, last in itertools.pairwise(edges))
+
+
+def _motion(along: Prepared, loads: Loads | None, recording: int, at: slice) -> tuple[int, Motion]:
+    """What effects see of some samples with those that they have to be run in by, and the first sample of these."""
+    r, nominal = along.recording, along.nominal
     load, total, carried, scaled = loads or (nominal, nominal, nominal - along.motor_side, nominal)
     error, gains = (r.servo.command - r.q, np.nan_to_num(r.servo.drive.kp)) if r.servo else (r.q, r.q[0])
-    per_sample = (r.t, r.q, r.qd, r.qdd, load, total, carried)
-    dt = float(r.t[-1] - r.t[0]) / (len(r.t) - 1)
-    first, last = (0, len(r.t)) if at is None else (at.start, at.stop)
-    out = np.empty((last - first, len(lib.entries[0])))
-    for start in range(max(first - RUN_IN, 0), max(last - RUN_IN, 1), NEW):
-        piece, pad = slice(start, min(start + CHUNK, len(r.t))), max(start + CHUNK - len(r.t), 0)
-        rigid = _each_sample(lambda x, pad=pad: _padded(x, pad), along.rigid_at(piece))
-        t, *moving = (_padded(x[piece], pad) for x in per_sample)
-        rate = _padded(_rate(scaled, piece, dt), pad)
-        near_rest = r.rest_speed, _padded(r.direction[piece], pad), np.array(float(recording))
-        turned = turned_before(r.q, along.turns, start, TURNS)
-        asked = r.servo and Asked(_padded(r.tau[piece], pad), _padded(error[piece], pad), gains)  # pyright: ignore[reportArgumentType]: NumPy
-        motion = Motion(t - r.began, *moving, rate, rigid, *near_rest, turned, asked)  # pyright: ignore[reportArgumentType, reportCallIssue]: NumPy
-        begin, end = max(start + RUN_IN if start else 0, first), min(start + CHUNK - RUN_OUT, last)
-        # One program for each effect: of all in one, XLA would evaluate parts again and again.
-        column = 0
-        for part in map(np.asarray, _ahead(_columns(b[0], b[1], b[2], motion) for b in lib.blocks)):
-            out[begin - first : end - first, column : column + part.shape[1]] = part[begin - start : end - start]
-            column += part.shape[1]
-    return out
+    start = max(at.start - RUN_IN, 0)
+    piece, pad = slice(start, min(start + CHUNK, len(r.t))), max(start + CHUNK - len(r.t), 0)
+    rigid = _each_sample(lambda x: _padded(x, pad), along.rigid_at(piece))
+    t, *moving = (_padded(x[piece], pad) for x in (r.t, r.q, r.qd, r.qdd, load, total, carried))
+    rate = _padded(_rate(scaled, piece, float(r.t[-1] - r.t[0]) / (len(r.t) - 1)), pad)
+    near_rest = r.rest_speed, _padded(r.direction[piece], pad), np.array(float(recording))
+    turned = turned_before(r.q, along.turns, start, TURNS)
+    asked = r.servo and Asked(_padded(r.tau[piece], pad), _padded(error[piece], pad), gains)  # pyright: ignore[reportArgumentType]: NumPy
+    return start, Motion(t - r.began, *moving, rate, rigid, *near_rest, turned, asked)  # pyright: ignore[reportArgumentType, reportCallIssue]: NumPy
 
 
 def _ahead(computations: Iterator[Array]) -> Iterator[Array]:
@@ -281,21 +309,23 @@ def _padded(x: np.ndarray, pad: int) -> np.ndarray:
     return np.pad(x, ((0, pad),) + ((0, 0),) * (x.ndim - 1), mode="edge")
 
 
-def unbounded(lib: Library, columns: np.ndarray) -> np.ndarray:
-    """Amplitudes whose columns, (t, entries), are not finite or beyond `LARGEST` at some joint.
+def unbounded(amplitudes: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Amplitudes that have columns, (t, entries), which are not finite or beyond `LARGEST` at some joint.
 
     A spring too soft for the weight on it buckles: along this motion there is no such law.
+
+    Args:
+        amplitudes: The amplitude of each column, shape (entries,).
+        columns: Some of those of `columns_along`.
     """
     with np.errstate(invalid="ignore"):
         bad = ~((columns.max(axis=0) < LARGEST) & (columns.min(axis=0) > -LARGEST))
-    return np.unique(lib.entries[1][bad])
+    return np.unique(amplitudes[bad])
 
 
-def without(lib: Library, columns: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
+def without(amplitudes: np.ndarray, columns: np.ndarray, left_out: np.ndarray) -> np.ndarray:
     """The columns, with those of some amplitudes zero: what moves nothing is never named."""
-    if len(amplitudes):
-        columns[:, np.isin(lib.entries[1], amplitudes)] = 0.0
-    return columns
+    return np.where(np.isin(amplitudes, left_out), 0.0, columns) if len(left_out) else columns
 
 
 # The rigid body is compiled apart: fused into this program, XLA would unroll it once for every use.

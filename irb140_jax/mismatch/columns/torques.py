@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
+from irb140_jax.arrays import on_device
 from irb140_jax.effects import At, Effect
 from irb140_jax.effects.torque_gain import EFFECT as TORQUE_GAIN
 from irb140_jax.mismatch.columns.along import Loads, Prepared, columns_along, unbounded, without
@@ -86,7 +86,7 @@ def better_known(robot: Robot, phi: np.ndarray, named: Sequence[Named]) -> Robot
     sprung = as_named(robot, named)
     springs = lambda r: (r.stiffness, r.springref)  # noqa: E731
     possible = consistent(phi, np.asarray(robot.phi))
-    return eqx.tree_at(springs, with_phi(robot, jnp.asarray(possible)), springs(sprung))
+    return eqx.tree_at(springs, with_phi(robot, on_device(possible)), springs(sprung))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,7 +145,7 @@ def composed(
         amplitudes: Amplitudes of each effect.
         dphi_refit, dphi_corrected: Shift of the inertial parameters in either model, shape (10 n,).
     """
-    columns = without(lib, columns, unbounded(lib, columns))
+    columns = without(lib.entries[1], columns, unbounded(lib.entries[1], columns))
     refit, corrected = np.moveaxis(along.torque_of(np.stack([dphi_refit, dphi_corrected], axis=1)), -1, 0)
     both = zip(lib.candidates, amplitudes, strict=True)
     parts = [(c.effect.place.at, lib.torque(columns, c.columns, w)) for c, w in both]

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
+from irb140_jax.arrays import on_device
 from irb140_jax.effects import Effect
 from irb140_jax.effects.catalogue import known
 from irb140_jax.errors import InputError
@@ -133,7 +133,7 @@ def from_json(data: dict[str, Any], effects: Sequence[Effect] = ()) -> Corrected
         InputError: The model holds an effect that is neither among these nor in the catalogue.
     """
     robot = data["robot"]
-    leaves = {k: jnp.asarray(np.array(_infinite(v), dtype=float)) for k, v in robot["leaves"].items()}
+    leaves = {k: on_device(np.array(_infinite(v), dtype=float)) for k, v in robot["leaves"].items()}
     return CorrectedModel(
         Robot(
             **leaves,  # pyright: ignore[reportArgumentType]: arrays only, static fields are named below

@@ -4,9 +4,9 @@ import dataclasses
 import pathlib
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 
+from irb140_jax.arrays import on_device
 from irb140_jax.mismatch.columns.torques import Named, as_named
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.inertials.consistent import consistent, is_body, of_bodies_or_nominal
@@ -28,11 +28,11 @@ def native_robot(model: CorrectedModel) -> Robot:
     """
     nominal = np.asarray(model.robot.phi)
     phi = of_bodies_or_nominal(model.phi_corrected, nominal)
-    robot = as_named(with_phi(model.robot, jnp.asarray(phi)), model.named)
+    robot = as_named(with_phi(model.robot, on_device(phi)), model.named)
     # Mass and moments of a payload are fitted one by one: with it, a link may be no body any more.
     with_effects = np.asarray(robot.phi)
     bodies = np.array([is_body(p) or not is_body(old) for p, old in zip(with_effects, nominal, strict=True)])
-    return with_phi(robot, jnp.asarray(np.where(bodies[:, None], with_effects, consistent(with_effects, nominal))))
+    return with_phi(robot, on_device(np.where(bodies[:, None], with_effects, consistent(with_effects, nominal))))
 
 
 def save_native(model: CorrectedModel, folder: pathlib.Path) -> None:

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from irb140_jax.arrays import on_device
 from irb140_jax.dynamics.chain import Plan, chain, plan
 from irb140_jax.dynamics.newton_euler import rigid_torque
 from irb140_jax.effects import Effect, Motion, RigidBody
@@ -232,8 +233,8 @@ def corrected_robot(model: CorrectedModel) -> CorrectedRobot:
         model: From `load_model`.
     """
     acting = tuple(
-        Acting(named.effect, named.joints, jnp.asarray(named.all_amplitudes()), jnp.asarray(named.shape, dtype=float))
+        Acting(named.effect, named.joints, on_device(named.all_amplitudes()), on_device(named.shape))
         for named in model.named
     )
     robot = better_known(model.robot, model.phi_corrected, model.named)
-    return CorrectedRobot(robot, model.robot, jnp.asarray(model.rest_speed), acting, plan(model.robot))
+    return CorrectedRobot(robot, model.robot, on_device(model.rest_speed), acting, plan(model.robot))

@@ -5,10 +5,10 @@ import dataclasses
 from collections.abc import Sequence
 
 import jax
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from irb140_jax.arrays import on_device
 from irb140_jax.mismatch.corrected.model import CorrectedModel
 from irb140_jax.mismatch.corrected.native import limited, native_robot
 from irb140_jax.mismatch.inertials.consistent import of_bodies_or_nominal
@@ -174,4 +174,4 @@ def compiled_robot(robot: Robot, step: float) -> mujoco.MjModel:
 def _refitted(model: CorrectedModel) -> Robot:
     """Refitted inertials of possible bodies, in the way of `native_robot`."""
     phi = of_bodies_or_nominal(model.phi_refit, np.asarray(model.robot.phi))
-    return with_phi(model.robot, jnp.asarray(phi))
+    return with_phi(model.robot, on_device(phi))

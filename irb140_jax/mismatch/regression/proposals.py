@@ -77,7 +77,7 @@ def _thin_columns(lib: Library, along: Sequence[Prepared], band: Band) -> np.nda
         for window, columns, bad in candidate_rows(lib, a, i, band):
             every.append(columns[-window.new % thin :: thin].copy())  # a view would keep the whole window
             endless.append(bad)
-    columns = without(lib, np.concatenate(every)[::THIN], np.concatenate(endless))
+    columns = without(lib.entries[1], np.concatenate(every)[::THIN], np.concatenate(endless))
     out = np.zeros((len(columns), lib.robot.n, lib.size))
     lib.spread(columns, out)
     return out

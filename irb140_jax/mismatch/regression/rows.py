@@ -16,7 +16,7 @@ from irb140_jax.mismatch.columns.along import (
     RUN_IN,
     Loads,
     Prepared,
-    columns_along,
+    columns_by_effect,
     tool_along,
     unbounded,
     without,
@@ -174,13 +174,18 @@ def candidate_rows(
     """
     recording, dt = along.recording, float(np.mean(np.diff(along.recording.t)))
     late = at if at and loads and at.log else None
+    joints, amplitudes = np.where(lib.in_log, -1, lib.entries[0]), lib.entries[1]
     for window in row_windows(band, len(recording.t), margin(late, dt), overlap):
-        columns = columns_along(lib, along, loads, index, window.samples)
-        endless = unbounded(lib, columns)
-        columns = without(lib, columns, endless)
-        if late:
-            columns = logged(late, columns, np.where(lib.in_log, -1, lib.entries[0]), dt)
-        yield window, window.low_passed(columns, band), endless
+        out = np.empty((window.rows.stop - window.rows.start, len(joints)))
+        endless: list[np.ndarray] = []
+        # One effect after the other: the samples of all columns would be many times the rows that are kept.
+        for own, columns in columns_by_effect(lib, along, loads, index, window.samples):
+            endless.append(unbounded(amplitudes[own], columns))
+            columns = without(amplitudes[own], columns, endless[-1])
+            if late:
+                columns = logged(late, columns, joints[own], dt)
+            out[:, own] = window.low_passed(columns, band)
+        yield window, out, np.concatenate([np.zeros(0, dtype=int), *endless])
 
 
 def stretch(

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax import dynamics
+from irb140_jax.arrays import on_device
 from irb140_jax.mismatch import settings
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.low_pass import Band
@@ -30,7 +30,7 @@ def scatter_by_sensor(
     """
     by_torque, by_encoder = [], []
     for raw, r in zip(recordings, smooth, strict=True):
-        poses = jnp.asarray(r.q[np.linspace(0, len(r.q) - 1, POSES).astype(int)])
+        poses = on_device(r.q[np.linspace(0, len(r.q) - 1, POSES).astype(int)])
         square = np.mean(np.asarray(_masses(robot, poses)) ** 2, axis=0)
         shaken = np.zeros(robot.n) if r.shaken is None else r.shaken
         by_torque.append(torque_scatter(raw, band) ** 2)

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from irb140_jax import dynamics
+from irb140_jax.arrays import on_device
 from irb140_jax.effects import At
 from irb140_jax.mismatch.columns.along import Loads, Prepared, pieces
 from irb140_jax.mismatch.columns.torques import Named, as_named
@@ -70,7 +70,7 @@ def regressor(at: Point, along: Prepared, samples: slice) -> np.ndarray:
     if at.leaning is None:
         return along.regressor_at(samples)
     r = along.recording
-    moving = (jnp.asarray(x[samples]) for x in (r.q, r.qd, r.qdd))
+    moving = (on_device(x[samples]) for x in (r.q, r.qd, r.qdd))
     return np.asarray(dynamics.regressor_batch(at.leaning, *moving))
 
 

@@ -220,12 +220,12 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
             return free, other
         from_nominal, late_from_nominal = free.averaged, free.late
     sets = averaged = {s: value for s, (value, _) in visited.items()}
-    scale, scale_found = scale_of(space), False
+    scale, scaled = scale_of(space), False
     if last:
         averaged = beside_scale(space, visited) if given.drive is None else sets
         every = named((*space.candidates, scale), averaged)
         stated = tuple(i for i in every if i < len(space.candidates))
-        scale_found = stated != every
+        scaled = stated != every
         found, found_hyper, late = shifting(stated, hyper if stated == best else settled(space, stated, hyper)[1])
         found, found_hyper, falls = falling(found, found_hyper)
         late = {site: late_from_nominal.get(site, why) for site, why in late.items()}
@@ -237,7 +237,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     data = dataclasses.replace(data, stretches=held)
     ex = Explanation(
         lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, averaged, scale,
-        given.factor, falls, scale_found, unproved=start.unproved, times=start.times,
+        given.factor, falls, scaled, unproved=start.unproved, times=start.times,
         payloads=tuple(r.recording.payload for r in start.along),
         open_rotors=left_open, linearised_at=timing, from_nominal=from_nominal, late=late,
     )  # fmt: skip

@@ -43,10 +43,9 @@ class Explanation:
         sets: Log posterior of every set that the search visited, with some scale of all logged torques in each.
         averaged: That of sets with the candidate `scale` and without any scale, over which probabilities are averages.
         scale: One scale of all logged torques; as a member of sets it comes after all candidates.
-        scale_found: Whether it is a finding.
+        scaled: Whether it is a finding, and as such in what predicts.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
         falls: Members that are named because friction certainly falls with speed, whatever its form.
-        scaled: Whether it is in posteriors, as a finding is.
         unproved: What the search found and unseen motions speak against: not named.
         times: When drives act, by which torques of its rows were made.
         payloads: What the tool carried in each recording, by which its rows were made.
@@ -74,7 +73,6 @@ class Explanation:
     scale: Candidate
     factor: np.ndarray
     falls: Mapping[int, Fall] = dataclasses.field(default_factory=dict)
-    scale_found: bool = False
     scaled: bool = False
     unproved: tuple[Site, ...] = ()
     times: Times = Times()
@@ -326,7 +324,7 @@ class Explanation:
             return {}
         if why := self._late(index):
             return dict(why.rivals)
-        stated = (*self.chosen, len(self.data.candidates)) if self.scale_found else self.chosen
+        stated = (*self.chosen, len(self.data.candidates)) if self.scaled else self.chosen
         return in_its_place(self.averaged_over, self._sets(index), stated, index)[0]
 
     def _late(self, index: int) -> Late | None:

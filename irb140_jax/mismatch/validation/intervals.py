@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-import jax.numpy as jnp
 import numpy as np
 
+from irb140_jax.arrays import on_device
 from irb140_jax.effects.grids import nearest_in_each_direction
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.candidates import Candidate
@@ -43,7 +43,7 @@ def parameters_of(
         # What makes it what it is counts as the speed nears zero, where the discrepancy counts, too.
         own = np.array(c.effect.law.own)
         cov[own, own] += ex.falls[index].at_rest ** 2
-    physical = lambda w: np.asarray(c.effect.law.physical(jnp.asarray(w), jnp.asarray(c.shape)))  # noqa: E731
+    physical = lambda w: np.asarray(c.effect.law.physical(on_device(w), on_device(c.shape)))  # noqa: E731
     variance = _variance_of(physical, w, cov, value) + over_shapes
     variance = variance + _variance_over_variants(ex, index, value)
     if c.effect.prior.of_rigid_body:
@@ -109,7 +109,7 @@ def physical_of(c: Candidate, w: np.ndarray) -> np.ndarray:
     """Physical parameters from the amplitudes that a candidate uses."""
     full = np.zeros(c.effect.law.width)
     full[list(c.variant)] = w
-    return np.asarray(c.effect.law.physical(jnp.asarray(full), jnp.asarray(c.shape)))
+    return np.asarray(c.effect.law.physical(on_device(full), on_device(c.shape)))
 
 
 def _variance_over_shapes(ex: Explanation, index: int, value: np.ndarray) -> np.ndarray:

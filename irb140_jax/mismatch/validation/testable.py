@@ -67,7 +67,7 @@ def reference(lib: Library, scales: Scales, rate: float) -> Reference:
     motion = played(fourier_motion(robot, rate=rate, **settings.LIVELY), scales.rest_speed)
     along = prepared(lib.robot, motion)
     effects = columns_along(lib, along)
-    effects = without(lib, effects, unbounded(lib, effects))
+    effects = without(lib.entries[1], effects, unbounded(lib.entries[1], effects))
     torque, amplitudes = np.sqrt(np.mean(along.nominal**2, axis=0)), np.zeros(lib.size)
     for effect, sites, shapes, first in lib.blocks:
         width = effect.law.width
