@@ -31,7 +31,7 @@ def given(error, qd):
     return np.array(KP) * error - np.array(KD) * qd
 
 
-def closed_loop(xml, seed=1, duration=16.0, delay=0.0, noise=NOISE, lag=0.0, law=None):
+def closed_loop(xml, seed=1, duration=10.0, delay=0.0, noise=NOISE, lag=0.0, law=None):
     """A recording of commands and positions, and the torque that MuJoCo's actuators gave, (T, 2) [N m].
 
     Commands act `delay` late [s].  With a lag [s] or a law like `given` there are no actuators: torque by that law

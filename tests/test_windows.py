@@ -1,17 +1,15 @@
 """Long recordings are taken window by window: nothing depends on where the windows are."""
 
-import dataclasses
 from functools import partial
 
 import numpy as np
 import pytest
-from test_tangent import BAND, FOUND, LOG, ROBOT, SMOOTH, N, found_model, settled
+from test_tangent import BAND, FOUND, ROBOT, SMOOTH, N, found_model, settled
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.columns import along as columns
-from irb140_jax.mismatch.columns.along import columns_along, prepared, scales_of
+from irb140_jax.mismatch.columns.along import columns_along, columns_by_effect, prepared, scales_of
 from irb140_jax.mismatch.columns.candidates import library
-from irb140_jax.mismatch.diagnose import diagnose
 from irb140_jax.mismatch.regression import rows
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
 from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
@@ -41,6 +39,16 @@ def test_columns_of_some_samples_are_those_of_all():
     part = columns_along(LIB, ALONG, at=slice(first, first + 200))
     size = np.maximum(np.abs(whole).max(axis=0), 1e-12)
     np.testing.assert_allclose(part / size, whole[first:][:200] / size, atol=1e-6)
+
+
+def test_samples_of_several_calls_are_those_of_one(monkeypatch):
+    few = library(ROBOT, [CATALOGUE[slug] for slug in ("coulomb_friction", "time_delay")], SCALES)
+    whole = columns_along(few, ALONG)
+    monkeypatch.setattr(columns, "NEW", 300)
+    monkeypatch.setattr(columns, "CHUNK", columns.RUN_IN + 300 + columns.RUN_OUT)
+    entries, parts = zip(*columns_by_effect(few, ALONG, None, -1, slice(0, len(SMOOTH.t))), strict=True)
+    assert [e.start for e in entries] == [0, entries[0].stop] and entries[1].stop == len(few.entries[0])
+    np.testing.assert_allclose(np.concatenate(parts, axis=1), whole, atol=1e-9)
 
 
 def test_what_a_soft_spring_still_rings_by_is_small():
@@ -110,18 +118,3 @@ def test_blocks_of_the_columns_that_are_held_add_up_to_the_same():
         sums = other.blocks.sum(axis=0)[np.ix_(theirs, theirs)]
         np.testing.assert_allclose(sums, one.blocks[0][np.ix_(places, places)], atol=1e-9 * np.abs(sums).max())
     assert data.nuisances == held.nuisances
-
-
-def test_a_diagnosis_does_not_depend_on_what_is_kept(monkeypatch):
-    tau = ALONG.nominal + 2.0 * SMOOTH.direction
-    noisy = np.stack([np.interp(LOG.t, SMOOTH.t, x) for x in tau.T], axis=1)
-    log = dataclasses.replace(LOG, tau=noisy + np.random.default_rng(1).normal(size=noisy.shape) * 0.02)
-    whole = diagnose(ROBOT, [log]).diagnosis
-    monkeypatch.setattr(columns, "KEPT", 0)
-    in_short_windows(monkeypatch)
-    long = diagnose(ROBOT, [log]).diagnosis
-    names = [[(f.effect, f.joints) for f in found.findings] for found in (whole, long)]
-    assert names[0] == names[1] and len(names[0]) == N
-    for one, other in zip(whole.findings, long.findings, strict=True):
-        for name, parameter in one.parameters.items():
-            assert other.parameters[name].value == pytest.approx(parameter.value, rel=1e-3)
