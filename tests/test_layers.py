@@ -9,7 +9,7 @@ PACKAGE = pathlib.Path(__file__).parents[1] / "irb140_jax"
 
 # Parts on one line stand beside each other and may not import each other.
 LAYERS = (
-    ("types", "errors", "allocator", "compilation_cache", "compiler", "tables"),
+    ("types", "errors", "arrays", "allocator", "compilation_cache", "compiler", "tables"),
     ("shapes",),
     ("sharding",),
     ("robot",),

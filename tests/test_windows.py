@@ -1,10 +1,12 @@
 """Long recordings are taken window by window: nothing depends on where the windows are."""
 
+import dataclasses
 from functools import partial
 
+import jax
 import numpy as np
 import pytest
-from test_tangent import BAND, FOUND, ROBOT, SMOOTH, N, found_model, settled
+from test_tangent import BAND, FOUND, LOG, ROBOT, SMOOTH, N, found_model, settled
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.columns import along as columns
@@ -18,6 +20,7 @@ from irb140_jax.mismatch.regression.nuisances import nuisances
 from irb140_jax.mismatch.regression.rows import bare_stretch, candidate_rows, stretch
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import point
+from irb140_jax.recordings.condition import condition
 
 ALONG = prepared(ROBOT, SMOOTH)
 SCALES = scales_of([ALONG])
@@ -49,6 +52,17 @@ def test_samples_of_several_calls_are_those_of_one(monkeypatch):
     entries, parts = zip(*columns_by_effect(few, ALONG, None, -1, slice(0, len(SMOOTH.t))), strict=True)
     assert [e.start for e in entries] == [0, entries[0].stop] and entries[1].stop == len(few.entries[0])
     np.testing.assert_allclose(np.concatenate(parts, axis=1), whole, atol=1e-9)
+
+
+def test_a_recording_of_another_length_needs_no_new_program():
+    few = library(ROBOT, [CATALOGUE[slug] for slug in ("coulomb_friction", "time_delay")], SCALES)
+    columns_along(few, ALONG)
+    shorter = condition(dataclasses.replace(LOG, t=LOG.t[:-100], q=LOG.q[:-100], tau=LOG.tau[:-100]), BAND)
+    assert len(shorter.t) < len(SMOOTH.t)
+    built = list[str]()
+    jax.monitoring.register_event_duration_secs_listener(lambda event, _, **__: built.append(event))
+    columns_along(few, prepared(ROBOT, shorter))
+    assert not [event for event in built if "/compile/" in event]
 
 
 def test_what_a_soft_spring_still_rings_by_is_small():
