@@ -61,7 +61,8 @@ def check_against_model(recording: Recording, seen: Glance, robot: Robot) -> Rec
     ):  # fmt: skip
         if not explained_by_a_payload(doubt, seen, robot, model, on_time):
             raise RecordingError(f"{recording.source}: {doubt.said}: {doubt.remedy}")
-        said = f"{doubt.said}; a payload that the model leaves out would explain it as well, and nothing is changed"
+        said = (f"{doubt.said}; a payload that the model leaves out, or another centre of mass, would explain about "
+                "as much, and nothing is changed")  # fmt: skip
         passed += [said] if said not in passed else []
     said = [f"tau.{recording.joint_names[j]} comes about {1000 * delay:.0f} ms after what the model needs: a drive "
             "that lags, or channels out of step" for j, delay in late.items() if delay > 0.0]  # fmt: skip
