@@ -18,7 +18,7 @@ from irb140_jax import dynamics, kinematics
 from irb140_jax.arrays import on_device
 from irb140_jax.compiler import QUICK
 from irb140_jax.dynamics.chunks import in_chunks
-from irb140_jax.effects import Asked, Motion, RigidBody, Scales
+from irb140_jax.effects import Asked, Effect, Motion, RigidBody, Scales
 from irb140_jax.effects.gravity_tilt import across
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.recordings.condition import Conditioned
@@ -247,7 +247,9 @@ def columns_along(
 def columns_by_effect(
     lib: Library, along: Prepared, loads: Loads | None, recording: int, at: slice
 ) -> Iterator[tuple[slice, np.ndarray]]:
-    """The same, one effect after the other: which of `Library.entries`, and their columns, shape (t, those).
+    """The same, some columns after others: which of `Library.entries`, and those columns, shape (t, those).
+
+    Those of one effect at all its sites, or at one site where it acts on all joints and has as many times the columns.
 
     Args:
         lib, along, loads, recording: See `columns_along`.
@@ -256,13 +258,21 @@ def columns_by_effect(
     calls = [(call, *_motion(along, loads, recording, call)) for call in _calls(at)]
     exact = [slice(call.start - first, call.stop - first) for call, first, _ in calls]
     # One program for each effect: of all in one, XLA would evaluate parts again and again.
-    every = _ahead(_columns(b[0], b[1], b[2], motion) for b in lib.blocks for _, _, motion in calls)
+    blocks = ((effect, sites, shapes) for effect, sites, shapes, _ in lib.blocks)
+    some = [(effect, sites[at], shapes[at]) for effect, sites, shapes in blocks for at in _at_once(effect, sites)]
+    every = _ahead(_columns(*which, motion) for which in some for _, _, motion in calls)
     column = 0
-    for _ in lib.blocks:
+    for _ in some:
         parts = [np.asarray(next(every))[use] for use in exact]
         part = parts[0] if len(parts) == 1 else np.concatenate(parts)
         yield slice(column, column + part.shape[1]), part
         column += part.shape[1]
+
+
+def _at_once(effect: Effect, sites: np.ndarray) -> list[slice]:
+    """Sites of an effect whose columns are computed together."""
+    every = len(sites)
+    return [slice(k, k + 1) for k in range(every)] if effect.place.everywhere else [slice(0, every)]
 
 
 def _calls(at: slice) -> Iterator[slice]:
