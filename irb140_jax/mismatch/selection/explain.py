@@ -11,14 +11,14 @@ from irb140_jax.effects import Effect, Scales
 from irb140_jax.effects.rotor_inertia import EFFECT as ROTOR
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import Loads, Prepared, all_prepared, scales_of, seen_by
-from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, of_kinds, reshaped
+from irb140_jax.mismatch.columns.candidates import Candidate, Library, library, of_kinds
 from irb140_jax.mismatch.columns.torques import Named, Torques, better_known, library_of, torques_of
 from irb140_jax.mismatch.inertials.prior import inertial_prior_factor
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
 from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
 from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.regression.nuisances import COMMON, Nuisances, nuisances
-from irb140_jax.mismatch.regression.proposals import left_over, suggested, with_proposals
+from irb140_jax.mismatch.regression.proposals import with_proposals
 from irb140_jax.mismatch.regression.rows import (
     Stretch,
     bare_stretch,
@@ -33,6 +33,7 @@ from irb140_jax.mismatch.selection.averages import Sets, Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
+from irb140_jax.mismatch.selection.finer_shapes import is_coarse, nearest_shape, refined
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.late_channels import Late, with_late_channels
 from irb140_jax.mismatch.selection.screening import gains
@@ -157,7 +158,7 @@ class _Start:
         every = with_loose_inertials(self.lib)
         kinds = {every[i].slug for i in self.chosen} | {c.slug for c in every if c.effect.prior.ordinary}
         lib = of_kinds(self.lib, kinds)
-        return lib, tuple(_same(every[i], every[i].shape, lib) for i in self.chosen)
+        return lib, tuple(nearest_shape(every[i], every[i].shape, lib) for i in self.chosen)
 
 
 def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
@@ -276,15 +277,15 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     along = [seen_by(better, r) for r in known]
     torques = [torques_of(robot, physics, r, found[0], found[0], i) for i, r in enumerate(along)]
     noise = noise_left(ex.data, ex.extra, ex.space, ex.chosen, ex.hyper)
-    coarse = _coarse(ex, noise)
+    coarse = is_coarse(ex, noise)
     # A coarse grid has no law that is right: with a discrepancy all its points are equally good.
     exact = _without_discrepancy(ex) if start.round == 1 or coarse else ex
-    lib, chosen = _refined(exact, start.lib, {(p.effect.slug, p.joints): p.shape for p in physics})
+    lib, chosen = refined(exact, start.lib, {(p.effect.slug, p.joints): p.shape for p in physics})
     at, loads, turn = point(robot, found[0], physics), [t.loads for t in torques], start.round + 1
     whole = turn == MOST_ROUNDS or not (start.whole or coarse or _off(ex, torques, given.band))
     every = with_loose_inertials(start.lib)
-    refined = {site_of(every[i]) for i in start.chosen if not start.whole and every[i].effect.shapes.finer}
-    lost = refined - _sites(ex.data, ex.chosen)
+    shaped = {site_of(every[i]) for i in start.chosen if not start.whole and every[i].effect.shapes.finer}
+    lost = shaped - _sites(ex.data, ex.chosen)
     dropped = (*start.dropped, *lost)
     return _Start(turn, lib, along, loads, whole, at, chosen, noise, dropped, start.unproved, times)
 
@@ -344,71 +345,3 @@ def _off(ex: Explanation, torques: Sequence[Torques], band: Band) -> bool:
 def _without_discrepancy(ex: Explanation) -> Explanation:
     """The explanation as if its laws were exact."""
     return dataclasses.replace(ex, hyper=tuple((*(0 for _ in s[:-1]), s[-1]) for s in ex.hyper))
-
-
-def _refined(
-    ex: Explanation, whole: Library, found: dict[Site, np.ndarray]
-) -> tuple[Library, tuple[int, ...]]:
-    """The whole library with finer grids around the best shapes, and grids that the residual suggests; and the set.
-
-    Args:
-        ex: The explanation.
-        whole: The library.
-        found: Shapes of what was found, taken where they follow from amplitudes.
-    """
-    left = left_over(ex.data, ex.columns(), ex.noise.total)
-    shapes, best = [], {i: ex.data.candidates[i].shape for i in ex.chosen}
-    for effect, sites, old, _ in whole.blocks:
-        new = old.copy()
-        for s, joints in enumerate(sites):
-            mine = [i for i in best if (ex.data.candidates[i].slug, ex.data.candidates[i].joints)
-                    == (effect.slug, tuple(joints))]  # fmt: skip
-            if mine and effect.shapes.finer:
-                best[mine[0]], peak = _peak(ex, mine[0])
-                if effect.shapes.follows:
-                    peak = found[site_of(ex.data.candidates[mine[0]])]
-                new[s] = effect.shapes.finer(old[s], peak)
-            elif effect.shapes.proposal and not mine:
-                new[s] = suggested(effect, left, ex.scales, joints, old[s])
-        shapes.append(new)
-    refined = reshaped(whole, shapes)
-    return refined, tuple(_same(ex.data.candidates[i], shape, refined) for i, shape in best.items())
-
-
-def _coarse(ex: Explanation, left: Noise) -> bool:
-    """Whether finer shapes may still leave less at some joint: the noise left there is not yet what it was thought.
-
-    Shapes that follow from amplitudes have no finer grid.
-
-    Args:
-        ex: The explanation.
-        left: Noise that it leaves.
-    """
-    shaped = [j for m in ex.members if m.effect.shapes.finer and not m.effect.shapes.follows for j in m.joints]
-    was, now = (np.sqrt(np.mean(noise.total**2, axis=0)) for noise in (ex.noise, left))
-    return bool(np.any(np.abs(np.log(now / was))[shaped] > settings.SETTLED_NOISE))
-
-
-def _peak(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
-    """The best point of a member's grid, and where the grid is at its best to a fraction of its steps."""
-    mine = ex.data.candidates[index]
-    grid, odds = _grid_of(ex, index)
-    best = grid[np.argmax(odds)] if np.isfinite(odds).any() else mine.shape
-    return best, mine.effect.shapes.peak(grid, best, odds)
-
-
-def _grid_of(ex: Explanation, index: int) -> tuple[np.ndarray, np.ndarray]:
-    """A member's grid, shape (points, shape parameters), and log odds of its points beside the other members."""
-    candidates, mine = ex.data.candidates, ex.data.candidates[index]
-    site = (mine.slug, mine.joints, mine.variant)
-    same = [i for i, c in enumerate(candidates) if (c.slug, c.joints, c.variant) == site]
-    return np.array([candidates[i].shape for i in same]), ex.gains(ex.others(index), same)
-
-
-def _same(c: Candidate, shape: np.ndarray, lib: Library) -> int:
-    """The candidate of a library nearest to a shape of one of another; loose inertials come after all effects."""
-    if c.is_inertials:
-        return len(lib.candidates) + c.joints[0]
-    site = (c.slug, c.joints, c.variant)
-    alike = [i for i, o in enumerate(lib.candidates) if (o.slug, o.joints, o.variant) == site]
-    return min(alike, key=lambda i: float(np.sum(np.abs(lib.candidates[i].shape - shape))))
