@@ -161,12 +161,33 @@ class _Start:
         return lib, tuple(nearest_shape(every[i], every[i].shape, lib) for i in self.chosen)
 
 
-def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
-    """One round, and whether it is the last: the whole library was searched, and named is only what is settled.
+@dataclasses.dataclass(frozen=True)
+class _Made:
+    """What a round has made of the recordings before it searches.
 
-    A round makes columns, sums over all rows, searches, and makes the columns of what was found; the last one of what
-    is named.
+    Attributes:
+        lib: The library that it searches.
+        chosen: The set with which the search starts.
+        each: Every recording with the loads that columns along it see; None stands for those of the nominal model.
+        data: Rows, with no column of a candidate, and candidates.
+        extra: Nuisance columns, one per recording.
+        noise: What whitens the rows.
+        space: What may be in a set.
+        allowed: The same without what may not be named.
     """
+
+    lib: Library
+    chosen: tuple[int, ...]
+    each: list[tuple[Prepared, Loads | None]]
+    data: Data
+    extra: list[Nuisances]
+    noise: Noise
+    space: Space
+    allowed: Space
+
+
+def _made(given: _Given, start: _Start) -> _Made | None:
+    """Columns along the recordings and sums over all rows; None where they have no bounds."""
     at, band, turn = start.at, given.band, start.round
     lib, chosen = start.searched()
     given.progress(f"columns of {len(lib.candidates)} candidate explanations along the recordings (round {turn})")
@@ -181,8 +202,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     columns = [partial(candidate_rows, lib, r, i, band, load, at) for i, (r, load) in enumerate(each)]
     sums = summed(lib, rows, columns, extra, noise)
     if at and not sums.finite:
-        # An explanation without bounds is nothing to start from.
-        return _explained(given, dataclasses.replace(start, at=None))
+        return None
     scale = prior_scale(lib, rows, given.uncertainty, sums.power)
     data = Data(rows, scale, with_loose_inertials(lib), len(given.factor))
     given.progress(f"searching sets of explanations (round {turn})")
@@ -195,28 +215,44 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     space = dataclasses.replace(space, centre=_centre(space, given.drive, start), silent=silent)
     sites = [site_of(c) for c in data.candidates]
     barred = [start.dropped.count(site) >= OFTEN or site in start.unproved for site in sites]
-    without_barred = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
-    search = partial(selected, without_barred, chosen, every_move=start.whole)
+    allowed = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
+    return _Made(lib, chosen, each, data, extra, noise, space, allowed)
+
+
+def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
+    """One round, and whether it is the last: the whole library was searched, and named is only what is settled.
+
+    A round makes columns, sums over all rows, searches, and makes the columns of what was found; the last one of what
+    is named.
+    """
+    at, from_nominal_model = start.at, partial(_explained, given, dataclasses.replace(start, at=None))
+    made = _made(given, start)
+    if made is None:
+        # An explanation without bounds is nothing to start from.
+        return from_nominal_model()
+    data, space = made.data, made.space
+    search = partial(selected, made.allowed, made.chosen, every_move=start.whole)
     best, hyper, visited = search()
-    falling = partial(with_falling_friction, space, data, extra[0], given.scales)
-    shifting = partial(with_late_channels, without_barred, held=at.rests_on if at else frozenset())
+    falling = partial(with_falling_friction, space, data, made.extra[0], given.scales)
+    shifting = partial(with_late_channels, made.allowed, held=at.rests_on if at else frozenset())
     found, found_hyper, late = shifting(best, hyper)
     # Slopes at an explanation say nothing of one without what it rests on: under leaning gravity that nothing is named
     # for, inertials can stand for the tilt.
     from_nominal: Sets = {}
     late_from_nominal: Mapping[Site, Late] = {}
     if at and not at.rests_on <= _sites(data, found):
-        free, last = _explained(given, dataclasses.replace(start, at=None))
+        free, last = from_nominal_model()
         if not at.rests_on <= _sites(free.data, free.chosen):
             return free, last
         best, hyper, visited = search(held=at.rests_on)
         found, found_hyper, late = shifting(best, hyper)
         from_nominal, late_from_nominal = free.averaged, free.late
     found, found_hyper, falls = falling(found, found_hyper)
-    last = start.whole and turn > 1 and (turn == MOST_ROUNDS or _sites(data, found) <= _sites(data, chosen))
+    settles = start.round == MOST_ROUNDS or _sites(data, found) <= _sites(data, made.chosen)
+    last = start.whole and start.round > 1 and settles
     timing = frozenset((law.effect.slug, law.joints) for law in at.timing) if at else frozenset()
     if last and timing and not from_nominal:
-        free, other = _explained(given, dataclasses.replace(start, at=None))
+        free, other = from_nominal_model()
         if not timing <= _sites(free.data, free.chosen):
             return free, other
         from_nominal, late_from_nominal = free.averaged, free.late
@@ -230,15 +266,15 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         found, found_hyper, late = shifting(stated, hyper if stated == best else settled(space, stated, hyper)[1])
         found, found_hyper, falls = falling(found, found_hyper)
         late = {site: late_from_nominal.get(site, why) for site, why in late.items()}
-    for joint in joints:
+    for joint in space.joints:
         joint.forget()
     left_open = _rotors_open(space, data, found, found_hyper) if last and given.drive is not None else ()
     members = [data.candidates[i] for i in (*found, *left_open)]
-    held = [with_candidates(s, members, r, band, load, at) for s, (r, load) in zip(rows, each, strict=True)]
-    data = dataclasses.replace(data, stretches=held)
+    held = [with_candidates(s, members, r, given.band, load, at)
+            for s, (r, load) in zip(data.stretches, made.each, strict=True)]  # fmt: skip
     ex = Explanation(
-        lib, given.scales, data, extra, noise, space, space, found, found_hyper, sets, averaged, scale,
-        given.factor, falls, scaled, unproved=start.unproved, times=start.times,
+        made.lib, given.scales, dataclasses.replace(data, stretches=held), made.extra, made.noise, space, space, found,
+        found_hyper, sets, averaged, scale, given.factor, falls, scaled, unproved=start.unproved, times=start.times,
         payloads=tuple(r.recording.payload for r in start.along),
         open_rotors=left_open, linearised_at=timing, from_nominal=from_nominal, late=late,
     )  # fmt: skip
