@@ -249,17 +249,19 @@ def columns_by_effect(
 ) -> Iterator[tuple[slice, np.ndarray]]:
     """The same, some columns after others: which of `Library.entries`, and those columns, shape (t, those).
 
-    Those of one effect at all its sites, or at one site where it acts on all joints and has as many times the columns.
+    Those of one effect at all its sites, or at one site where it acts on all joints, so that there are n times as many.
 
     Args:
         lib, along, loads, recording: See `columns_along`.
         at: The samples: not many, for what the rigid body does along them is held.
     """
+    if not lib.blocks:
+        return
     calls = [(call, *_motion(along, loads, recording, call)) for call in _calls(at)]
     exact = [slice(call.start - first, call.stop - first) for call, first, _ in calls]
     # One program for each effect: of all in one, XLA would evaluate parts again and again.
     blocks = ((effect, sites, shapes) for effect, sites, shapes, _ in lib.blocks)
-    some = [(effect, sites[at], shapes[at]) for effect, sites, shapes in blocks for at in _at_once(effect, sites)]
+    some = [(effect, sites[of], shapes[of]) for effect, sites, shapes in blocks for of in _at_once(effect, sites)]
     every = _ahead(_columns(*which, motion) for which in some for _, _, motion in calls)
     column = 0
     for _ in some:
