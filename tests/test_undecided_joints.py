@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.output.notes import rest_notes
+from irb140_jax.mismatch.output.notes import left_notes, rest_notes
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.mismatch.validation.undecided_joints import made_worse, undecidable
 from irb140_jax.recordings.low_pass import Band
@@ -107,3 +107,15 @@ def test_errors_while_a_joint_moves_are_told_where_most_of_the_error_is_at_rest(
     assert len(notes) == told
     if told:
         assert all(part in notes[0] for part in ("rests", "is 3 N", "2 with refitted", "1 with the corrected"))
+
+
+@pytest.mark.parametrize(("size", "scatter", "elsewhere", "told"), [
+    (10.0, 0.1, (), True), (10.0, 0.1, (0,), False), (10.0, 0.5, (), False), (100.0, 0.1, (), False),
+])  # fmt: skip
+def test_more_than_noise_that_depends_on_nothing_known_is_told(size, scatter, elsewhere, told):
+    rows = [np.full((100, 1), True)]
+    some = dataclasses.replace(proof(1.0, 100), corrected=[np.ones((100, 1))], recorded=rows, use=rows)
+    notes = left_notes(made.robot(pendulum=True), some, np.array([scatter]), np.array([size]), elsewhere)
+    assert len(notes) == told
+    if told:
+        assert "hinge 1 N m RMS (10 % of its torque)" in notes[0]

@@ -20,6 +20,7 @@ from irb140_jax.mismatch.output.notes import (
     friction_notes,
     gap_notes,
     inertial_notes,
+    left_notes,
     notes,
     rest_notes,
     timing_notes,
@@ -231,10 +232,11 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     channels = timing_notes(of.ex) if of.servo is None else [
         *motion_notes(robot, of.fit), *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo)]
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
+    scatter, told = np.hypot(*of.sensors), {*missing, *(s.joint for s in of.rest)}
     return [
         *of.data.servo_notes, *link_encoder_notes(of.data, of.model, of.findings),
         *harmful_notes(robot, of.harmful), *open_joints,
-        *rest_notes(robot, of.proof, np.hypot(*of.sensors)),
+        *rest_notes(robot, of.proof, scatter), *left_notes(robot, of.proof, scatter, torque, told),
         *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names, judged),
         *channels, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
         *notes(of.data, of.uncertainty, judged), *gap_notes(robot, gap, torque, lacking),

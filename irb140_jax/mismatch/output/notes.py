@@ -1,6 +1,6 @@
 """What a person should know beside the verdict: repairs, assumptions, warnings, joints that were not judged."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -68,6 +68,34 @@ def rest_notes(robot: Robot, proof: HeldOut, scatter: np.ndarray) -> list[str]:
             f"{refit} with refitted inertials and {corrected} with the corrected model."
         )
     return out
+
+
+def left_notes(
+    robot: Robot, proof: HeldOut, scatter: np.ndarray, torque: np.ndarray, told: Collection[int]
+) -> list[str]:
+    """A note on joints whose error is more than the sensors' scatter, where nothing says what it depends on.
+
+    Args:
+        robot: The nominal model.
+        proof: Errors on unseen data.
+        scatter: Of the sensors, shape (n,) [N m or N].
+        torque: Size of the joints' torque, shape (n,).
+        told: Joints of which something else is said.
+    """
+    left = proof.rmse(proof.corrected)
+    much = left > np.maximum(settings.MATERIAL_TORQUE * torque, settings.ABOVE_NOISE * scatter)
+    said = [
+        f"{robot.joint_names[j]} {digits(left[j])} {'N' if robot.is_slide[j] else 'N m'} RMS "
+        f"({100 * left[j] / max(torque[j], 1e-300):.0f} % of its torque)"
+        for j in np.flatnonzero(proof.judged & much)
+        if j not in told
+    ]
+    if not said:
+        return []
+    return [
+        "Not all of the torque is explained, and nothing that was tried says what the rest depends on. While the joint "
+        f"moves, the corrected model leaves more than the noise of the sensors on unseen data: {', '.join(said)}."
+    ]
 
 
 def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
