@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
-from irb140_jax.arrays import on_device
 from irb140_jax.robot import Robot
 
 SPEED_GUESS = (2.0, 0.5)  # [rad/s], [m/s]: an industrial arm of middle size, used where the model gives no speed limit
@@ -161,7 +161,7 @@ def within(robot: Robot, low: np.ndarray, high: np.ndarray, speed: np.ndarray | 
         speed: Largest speeds allowed [rad/s or m/s], shape (n,); none by default.
     """
     room = np.maximum(LEAST_ROOM - 0.5 * (high - low), 0.0)
-    fill = lambda given, seen: on_device(np.where(np.isfinite(given), given, seen))  # noqa: E731
+    fill = lambda given, seen: jnp.asarray(np.where(np.isfinite(given), given, seen))  # noqa: E731
     limits = (
         fill(robot.lower, low - room), fill(robot.upper, high + room),
         robot.velocity_limit if speed is None else fill(robot.velocity_limit, speed),
