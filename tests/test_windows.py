@@ -60,7 +60,11 @@ def test_a_recording_of_another_length_needs_no_new_program():
     shorter = condition(dataclasses.replace(LOG, t=LOG.t[:-100], q=LOG.q[:-100], tau=LOG.tau[:-100]), BAND)
     assert len(shorter.t) < len(SMOOTH.t)
     built = list[str]()
-    jax.monitoring.register_event_duration_secs_listener(lambda event, _, **__: built.append(event))
+
+    def noted(event: str, duration_secs: float, **kwargs: str | int) -> None:
+        built.append(event)
+
+    jax.monitoring.register_event_duration_secs_listener(noted)
     columns_along(few, prepared(ROBOT, shorter))
     assert not [event for event in built if "/compile/" in event]
 
