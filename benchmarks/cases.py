@@ -80,7 +80,7 @@ def paper_style(robot: Robot, size: int = 2000) -> dict[str, float]:
 def identification(robot: Robot, size: int = 60_000) -> dict[str, float]:
     """Least squares of a minute at 1 kHz: Gram matrix in one pass against Pinocchio's regressors and NumPy's lstsq."""
     samples = motion(robot, size)
-    tau = np.asarray(dynamics.inverse_dynamics_batch(robot, *(jnp.asarray(x) for x in samples)))
+    tau = np.asarray(dynamics.inverse_dynamics_batch(robot, *samples))
     tau = tau - np.asarray(robot.armature) * samples[2] + np.random.default_rng(1).normal(size=tau.shape)
     model = peers.pinocchio_model(robot)
     arrays = [jnp.asarray(x) for x in (*samples, tau)]

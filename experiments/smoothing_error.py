@@ -11,7 +11,6 @@ import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 import tyro
 from trials import Kind, case_of
@@ -50,7 +49,7 @@ def errors(robot: Robot, case: ConcealedCase) -> np.ndarray:
     """RMS error of each joint's torque within the band, shape (recordings, n)."""
     recordings = [dataclasses.replace(r, qd=None, qdd=None) for r in case.recordings[:-1]]
     band = choose_band(recordings, robot)
-    torque = lambda r: np.asarray(dynamics.inverse_dynamics_batch(robot, *(jnp.asarray(x) for x in (r.q, r.qd, r.qdd))))  # noqa: E731
+    torque = lambda r: np.asarray(dynamics.inverse_dynamics_batch(robot, r.q, r.qd, r.qdd))  # noqa: E731
     out = []
     for log, s in zip(case.secret.logs, conditioned(recordings, band), strict=False):
         true = filtered(torque(log), kernels(band.torque, 1.0 / float(np.median(np.diff(log.t))))[0])

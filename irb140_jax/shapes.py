@@ -3,7 +3,7 @@
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, get_args
 
 import jax.numpy as jnp
 import numpy as np
@@ -21,7 +21,7 @@ def shape_checked(function: Callable[P, R]) -> Callable[P, R]:
     Under `jax.jit` this costs nothing; under `jax.vmap` the shapes are those of one sample, as annotated.
     """
     parameters = list(inspect.signature(function).parameters.values())
-    wanted = {p.name: p.annotation.dim_str.split() for p in parameters if hasattr(p.annotation, "dim_str")}
+    wanted = {p.name: dims for p in parameters if (dims := _wanted(p.annotation))}
     names = [p.name for p in parameters]
     named = getattr(function, "__name__", "function")
 
@@ -38,6 +38,12 @@ def shape_checked(function: Callable[P, R]) -> Callable[P, R]:
         return function(*(given[name] for name in names[: len(args)]), **{name: given[name] for name in kwargs})  # pyright: ignore
 
     return checked
+
+
+def _wanted(annotation: Any) -> list[str]:
+    """Dimensions that an annotation, or the first of a union that has any, wants of an array."""
+    kinds = (annotation, *get_args(annotation))
+    return next((kind.dim_str.split() for kind in kinds if hasattr(kind, "dim_str")), [])
 
 
 def _check(function: str, name: str, dims: list[str], came: tuple[int, ...], sizes: dict[str, Any]) -> None:

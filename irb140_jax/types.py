@@ -1,5 +1,6 @@
 """Names for array shapes, used in every signature.  n is the number of joints, T of samples."""
 
+import numpy as np
 from jaxtyping import Array, Float
 
 Scalar = Float[Array, ""]
@@ -11,3 +12,4 @@ Pose = Float[Array, "4 4"]
 Inertials = Float[Array, "n 10"]
 Samples = Float[Array, " T"]
 JointSamples = Float[Array, "T n"]
+JointBatch = Float[Array | np.ndarray, "T n"]  # samples that are handed on in chunks, of either library

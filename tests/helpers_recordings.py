@@ -1,5 +1,6 @@
 """Recordings made with MuJoCo's own inverse dynamics, to be spoiled by the tests."""
 
+import functools
 import pathlib
 
 import mujoco
@@ -10,6 +11,7 @@ import pytest
 import irb140_jax as irb
 from irb140_jax.errors import RecordingError
 from irb140_jax.recordings import Recording, read_recording, write_recording
+from irb140_jax.recordings.conceal import demo_case
 from irb140_jax.robot import robot_from_model
 
 ARM = """
@@ -38,6 +40,12 @@ def model(slide: bool = False, pendulum: bool = False) -> mujoco.MjModel:
 
 def robot(**kind: bool) -> irb.Robot:
     return robot_from_model(model(**kind), source="test arm")
+
+
+@functools.cache
+def shipped() -> tuple[Recording, ...]:
+    """Sound recordings of the IRB 140, of the demo."""
+    return demo_case(1, duration=8.0).recordings
 
 
 def motion(

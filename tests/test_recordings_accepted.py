@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 
 import irb140_jax as irb
 from irb140_jax.recordings import Recording
-from irb140_jax.recordings.conceal import demo_case
 from irb140_jax.robot import irb140, irb140_path, robot_from_model
 from testbed import runner
 from testbed.cases import make
@@ -30,10 +29,8 @@ def sound() -> Recording:
     return made.recording()
 
 
-@pytest.fixture(scope="module")
-def shipped() -> tuple[Recording, ...]:
-    """Sound recordings of the IRB 140, of the demo."""
-    return demo_case(1, duration=8.0).recordings
+def passes(recording, robot, tmp_path):
+    assert len(made.read_of(recording, robot, tmp_path).t) == len(recording.t)
 
 
 def test_a_slow_motion_seen_by_a_coarse_encoder_is_not_taken_for_degrees(tmp_path):
@@ -102,16 +99,16 @@ def later(recording, delay):
 
 
 @pytest.mark.parametrize("delay", [0.155, -0.1])
-def test_torque_that_is_out_of_step_by_more_than_a_diagnosis_finds_is_stated(shipped, sound, robot, tmp_path, delay):
-    for recording, arm in [*((r, irb140()) for r in shipped), (sound, robot)]:
+def test_torque_that_is_out_of_step_by_more_than_a_diagnosis_finds_is_stated(sound, robot, tmp_path, delay):
+    for recording, arm in [*((r, irb140()) for r in made.shipped()), (sound, robot)]:
         notes = " ".join(made.read_of(later(recording, delay), arm, tmp_path).notes)
         (said,) = re.findall(r"most joints comes about (\d+) ms (\w+)", notes)
         assert float(said[0]) == pytest.approx(1000 * abs(delay), abs=5) and (said[1] == "after") == (delay > 0)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.025])
-def test_delays_that_a_diagnosis_finds_are_no_note_of_the_reading(shipped, sound, robot, tmp_path, delay):
-    for recording, arm in [*((r, irb140()) for r in shipped), (sound, robot)]:
+def test_delays_that_a_diagnosis_finds_are_no_note_of_the_reading(sound, robot, tmp_path, delay):
+    for recording, arm in [*((r, irb140()) for r in made.shipped()), (sound, robot)]:
         assert made.read_of(later(recording, delay), arm, tmp_path).notes == ()
 
 
@@ -172,10 +169,6 @@ def test_a_saturated_torque_passes_and_is_stated(sound, robot, tmp_path):
 def test_a_joint_beyond_its_limits_passes_and_is_stated(robot, tmp_path):
     again = made.read_of(made.recording(size=6.0), robot, tmp_path)
     assert "beyond the limits in the model" in " ".join(again.notes)
-
-
-def passes(recording, robot, tmp_path):
-    assert len(made.read_of(recording, robot, tmp_path).t) == len(recording.t)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from irb140_jax.recordings import Recording
-from irb140_jax.recordings.conceal import demo_case
 from irb140_jax.robot import irb140
 
 
@@ -21,12 +20,6 @@ def robot():
 @pytest.fixture(scope="module")
 def sound() -> Recording:
     return made.recording()
-
-
-@pytest.fixture(scope="module")
-def shipped() -> tuple[Recording, ...]:
-    """Sound recordings of the IRB 140, of the demo."""
-    return demo_case(1, duration=8.0).recordings
 
 
 def test_positions_in_degrees_beside_speeds_in_radians_are_recognised(sound, robot, tmp_path):
@@ -111,8 +104,8 @@ def test_torque_in_another_unit_is_refused_with_the_factor_that_mends_it(tmp_pat
 
 
 @pytest.mark.parametrize("factor", [0.15, 0.05, 0.01])
-def test_torque_of_the_irb_140_on_the_motors_side_is_not_taken_for_degrees(shipped, tmp_path, factor):
-    for recording in shipped:
+def test_torque_of_the_irb_140_on_the_motors_side_is_not_taken_for_degrees(tmp_path, factor):
+    for recording in made.shipped():
         message = made.refusal(dataclasses.replace(recording, tau=factor * recording.tau), irb140(), tmp_path)
         (said,) = re.findall(r'"tau.joint2" = (\S+?),? ', message + " ")
         assert "degrees" not in message and "gear ratio" in message
@@ -120,8 +113,8 @@ def test_torque_of_the_irb_140_on_the_motors_side_is_not_taken_for_degrees(shipp
 
 
 @pytest.mark.parametrize("factor", [0.01, 1000.0])
-def test_torque_of_one_joint_in_another_unit_is_refused_and_no_other_joint_is_named(shipped, tmp_path, factor):
-    for recording in shipped:
+def test_torque_of_one_joint_in_another_unit_is_refused_and_no_other_joint_is_named(tmp_path, factor):
+    for recording in made.shipped():
         tau = recording.tau * np.where(np.arange(6) == 1, factor, 1.0)
         message = made.refusal(dataclasses.replace(recording, tau=tau), irb140(), tmp_path)
         (said,) = re.findall(r'would be "tau.joint2" = (\S+)$', message)

@@ -12,6 +12,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.columns import along as columns
 from irb140_jax.mismatch.columns.along import columns_along, columns_by_effect, prepared, scales_of
 from irb140_jax.mismatch.columns.candidates import library
+from irb140_jax.mismatch.diagnose import diagnose
 from irb140_jax.mismatch.regression import rows
 from irb140_jax.mismatch.regression.assemble import Data, assembled, judged, prior_scale, with_loose_inertials
 from irb140_jax.mismatch.regression.joint_grams import grams_by_block, joint_grams
@@ -56,15 +57,18 @@ def test_samples_of_several_calls_are_those_of_one(monkeypatch):
 
 def test_a_recording_of_another_length_needs_no_new_program():
     few = library(ROBOT, [CATALOGUE[slug] for slug in ("coulomb_friction", "time_delay")], SCALES)
-    columns_along(few, ALONG)
-    shorter = condition(dataclasses.replace(LOG, t=LOG.t[:-100], q=LOG.q[:-100], tau=LOG.tau[:-100]), BAND)
-    assert len(shorter.t) < len(SMOOTH.t)
     built = list[str]()
 
     def noted(event: str, duration_secs: float, **kwargs: str | int) -> None:
         built.append(event)
 
     jax.monitoring.register_event_duration_secs_listener(noted)
+    jax.jit(lambda x: x + 1.0)(np.zeros(7))
+    assert "/compile/" in "".join(built)  # a program that is new is seen
+    columns_along(few, ALONG)
+    shorter = condition(dataclasses.replace(LOG, t=LOG.t[:-100], q=LOG.q[:-100], tau=LOG.tau[:-100]), BAND)
+    assert len(shorter.t) < len(SMOOTH.t)
+    built.clear()
     columns_along(few, prepared(ROBOT, shorter))
     assert not [event for event in built if "/compile/" in event]
 
@@ -136,3 +140,18 @@ def test_blocks_of_the_columns_that_are_held_add_up_to_the_same():
         sums = other.blocks.sum(axis=0)[np.ix_(theirs, theirs)]
         np.testing.assert_allclose(sums, one.blocks[0][np.ix_(places, places)], atol=1e-9 * np.abs(sums).max())
     assert data.nuisances == held.nuisances
+
+
+def test_a_diagnosis_does_not_depend_on_what_is_kept(monkeypatch):
+    tau = ALONG.nominal + 2.0 * SMOOTH.direction
+    noisy = np.stack([np.interp(LOG.t, SMOOTH.t, x) for x in tau.T], axis=1)
+    log = dataclasses.replace(LOG, tau=noisy + np.random.default_rng(1).normal(size=noisy.shape) * 0.02)
+    whole = diagnose(ROBOT, [log]).diagnosis
+    monkeypatch.setattr(columns, "KEPT", 0)
+    in_short_windows(monkeypatch)
+    long = diagnose(ROBOT, [log]).diagnosis
+    names = [[(f.effect, f.joints) for f in found.findings] for found in (whole, long)]
+    assert names[0] == names[1] and len(names[0]) == N
+    for one, other in zip(whole.findings, long.findings, strict=True):
+        for name, parameter in one.parameters.items():
+            assert other.parameters[name].value == pytest.approx(parameter.value, rel=1e-3)

@@ -8,11 +8,11 @@ from irb140_jax.dynamics.newton_euler import rigid_torque
 from irb140_jax.dynamics.passive import passive_torque
 from irb140_jax.robot import Robot
 from irb140_jax.shapes import shape_checked
-from irb140_jax.types import JointSamples
+from irb140_jax.types import JointBatch, JointSamples
 
 
 @shape_checked
-def inverse_dynamics_batch(robot: Robot, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> JointSamples:
+def inverse_dynamics_batch(robot: Robot, q: JointBatch, qd: JointBatch, qdd: JointBatch) -> JointSamples:
     """`inverse_dynamics` of T samples, arrays of shape (T, n) -> joint torques (T, n)."""
     return in_chunks(_torque_of_chunk, (robot, plan(robot)), (q, qd, qdd))
 

@@ -20,9 +20,10 @@ CHUNK = 1000
 SEGMENT = 20 * CHUNK
 
 Kernel = Callable[..., Float[Array, "c ..."]]
+Batch = Float[Array | np.ndarray, "T ..."]
 
 
-def in_chunks(kernel: Kernel, given: Any, samples: tuple[Float[Array, "T ..."], ...]) -> Float[Array, "T ..."]:
+def in_chunks(kernel: Kernel, given: Any, samples: tuple[Batch, ...]) -> Float[Array, "T ..."]:
     """kernel(given, *samples) for samples along the first axis, CHUNK of them at a time.
 
     Arrays are padded with zeros to whole chunks.  Under a trace (jit, grad, vmap) the number of chunks is part of the
@@ -46,7 +47,7 @@ def in_chunks(kernel: Kernel, given: Any, samples: tuple[Float[Array, "T ..."], 
     return on_device(result)
 
 
-def sum_of_chunks(kernel: Kernel, given: Any, samples: tuple[Float[Array, "T ..."], ...]) -> Float[Array, "..."]:
+def sum_of_chunks(kernel: Kernel, given: Any, samples: tuple[Batch, ...]) -> Float[Array, "..."]:
     """Sum of kernel(given, *samples) over chunks of the samples, which the kernel sums over within a chunk.
 
     As `in_chunks`; samples that pad the last chunk are zero and must not add to the sum.
@@ -116,7 +117,7 @@ def _chunk(arrays: list[Array], k: Array | int) -> list[Array]:
     return [lax.dynamic_slice_in_dim(x, k * CHUNK, CHUNK) for x in arrays]
 
 
-def _traced(kernel: Kernel, given: Any, samples: tuple[Array, ...]) -> Array:
+def _traced(kernel: Kernel, given: Any, samples: tuple[Batch, ...]) -> Array:
     size = samples[0].shape[0]
     if size <= CHUNK:
         return kernel(given, *samples)
@@ -124,7 +125,7 @@ def _traced(kernel: Kernel, given: Any, samples: tuple[Array, ...]) -> Array:
     return result.reshape(-1, *result.shape[2:])[:size]
 
 
-def _traced_sum(kernel: Kernel, given: Any, samples: tuple[Array, ...]) -> Array:
+def _traced_sum(kernel: Kernel, given: Any, samples: tuple[Batch, ...]) -> Array:
     if samples[0].shape[0] <= CHUNK:
         return kernel(given, *samples)
     stacked = _stacked(samples)
@@ -133,7 +134,7 @@ def _traced_sum(kernel: Kernel, given: Any, samples: tuple[Array, ...]) -> Array
     return lax.scan(lambda total, part: (total + kernel(given, *part), None), start, stacked)[0]
 
 
-def _stacked(samples: tuple[Array, ...]) -> list[Array]:
+def _stacked(samples: tuple[Batch, ...]) -> list[Array]:
     """Samples in whole chunks, (T, ...) -> (chunks, CHUNK, ...), padded with zeros."""
     spare = -samples[0].shape[0] % CHUNK
     padded = [jnp.pad(x, [(0, spare)] + [(0, 0)] * (x.ndim - 1)) for x in samples]

@@ -9,16 +9,16 @@ from irb140_jax.dynamics.chunks import sum_of_chunks
 from irb140_jax.dynamics.regressor import regressor_blocks
 from irb140_jax.robot import Robot
 from irb140_jax.robot.tree import carried, path
-from irb140_jax.types import JointSamples
+from irb140_jax.types import JointBatch
 
 
 def regressor_gram(
     robot: Robot,
-    q: JointSamples,
-    qd: JointSamples,
-    qdd: JointSamples,
-    tau: JointSamples,
-    weight: JointSamples | None = None,
+    q: JointBatch,
+    qd: JointBatch,
+    qdd: JointBatch,
+    tau: JointBatch,
+    weight: JointBatch | None = None,
 ) -> Float[Array, "g g"]:
     """Gram matrix W^T W of W = diag(weight) [Y, tau], stacked over all samples and joints.
 
@@ -38,7 +38,7 @@ def regressor_gram(
 
     Source: Gautier (1997), Dynamic identification of robots with power model, sec. 3 (normal equations, recursively).
     """
-    weights = jnp.ones_like(tau) if weight is None else weight
+    weights = np.ones(tau.shape) if weight is None else weight
     given = (robot, plan(robot, regrouped=False))
     return sum_of_chunks(_gram_of_chunk, given, (q, qd, qdd, tau, weights))
 

@@ -15,7 +15,7 @@ from irb140_jax.dynamics.stage import always, staged
 from irb140_jax.robot import Robot
 from irb140_jax.robot.tree import path
 from irb140_jax.shapes import shape_checked
-from irb140_jax.types import Joints, JointSamples
+from irb140_jax.types import JointBatch, Joints, JointSamples
 
 # Unit motions of joints: angular, and linear at a frame's origin.
 Screw = tuple[Vector, Vector]
@@ -41,7 +41,7 @@ def regressor(robot: Robot, q: Joints, qd: Joints, qdd: Joints) -> Float[Array, 
 
 
 @shape_checked
-def regressor_batch(robot: Robot, q: JointSamples, qd: JointSamples, qdd: JointSamples) -> Float[Array, "T n k"]:
+def regressor_batch(robot: Robot, q: JointBatch, qd: JointBatch, qdd: JointBatch) -> Float[Array, "T n k"]:
     """`regressor` of T samples, arrays of shape (T, n) -> (T, n, 10 n)."""
     return in_chunks(_regressor_of_chunk, (robot, plan(robot, regrouped=False)), (q, qd, qdd))
 

@@ -73,7 +73,7 @@ def _coherent_limit(recordings: list[Recording], smooth: list[Conditioned], robo
     moving = eqx.tree_at(passive, robot, (on_device(np.zeros(robot.n)),) * 3)
     for r, alive in zip(smooth, living, strict=True):
         loaded = carrying(moving, r.payload)
-        m = np.asarray(dynamics.inverse_dynamics_batch(loaded, *(on_device(x) for x in (r.q, r.qd, r.qdd))))
+        m = np.asarray(dynamics.inverse_dynamics_batch(loaded, r.q, r.qd, r.qdd))
         friction = np.concatenate([r.direction, r.qd], axis=1)
         slow = filtered(np.concatenate([r.tau, m, r.qdd, friction], axis=1), kernels(SLOW, band.rate)[0])
         for j in np.flatnonzero(alive):

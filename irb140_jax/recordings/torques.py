@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from irb140_jax.arrays import on_device
 from irb140_jax.dynamics import inverse_dynamics_batch
 from irb140_jax.robot import Robot
 
@@ -27,7 +26,7 @@ class Torques(NamedTuple):
 
 def nominal_torques(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> Torques:
     """Gravity and motion torque of the nominal model along a motion, arrays of shape (SAMPLES, n)."""
-    at, still = on_device(q), on_device(np.zeros(q.shape))
-    gravity = np.asarray(inverse_dynamics_batch(robot, at, still, still))
-    total = np.asarray(inverse_dynamics_batch(robot, at, on_device(qd), on_device(qdd)))
+    still = np.zeros(q.shape)
+    gravity = np.asarray(inverse_dynamics_batch(robot, q, still, still))
+    total = np.asarray(inverse_dynamics_batch(robot, q, qd, qdd))
     return Torques(gravity, total - gravity)

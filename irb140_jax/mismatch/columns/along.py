@@ -163,7 +163,7 @@ def seen_by(robot: Robot, along: Prepared) -> Prepared:
 
 
 def _regressor(robot: Robot, r: Conditioned, at: slice) -> np.ndarray:
-    return np.asarray(dynamics.regressor_batch(robot, *(on_device(x[at]) for x in (r.q, r.qd, r.qdd))))
+    return np.asarray(dynamics.regressor_batch(robot, r.q[at], r.qd[at], r.qdd[at]))
 
 
 PER_SAMPLE = ("by_gravity", "held", "by_q", "by_qd", "mass", "tool", "tool_jacobian")  # of `RigidBody`
@@ -209,12 +209,12 @@ def _by_gravity(bare: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def _torque(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    return np.asarray(dynamics.inverse_dynamics_batch(robot, *(on_device(x) for x in (q, qd, qdd))))
+    return np.asarray(dynamics.inverse_dynamics_batch(robot, q, qd, qdd))
 
 
 def tool_along(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Position of the tool in the world, (T, 3), and its velocity per joint speed, (T, n, 3)."""
-    both = np.asarray(in_chunks(_tool_of_chunk, robot, (on_device(q),)))
+    both = np.asarray(in_chunks(_tool_of_chunk, robot, (q,)))
     return both[:, 0], both[:, 1:]
 
 
@@ -247,9 +247,11 @@ def columns_along(
 def columns_by_effect(
     lib: Library, along: Prepared, loads: Loads | None, recording: int, at: slice
 ) -> Iterator[tuple[slice, np.ndarray]]:
-    """The same, some columns after others: which of `Library.entries`, and those columns, shape (t, those).
+    """Columns of one effect after another, so that no more than these are in memory at once.
 
-    Those of one effect at all its sites, or at one site where it acts on all joints, so that there are n times as many.
+    An effect that acts on all joints has n times as many columns; it comes one site after another.
+
+    Yields which of `Library.entries` they are of, and the columns, shape (t, those entries).
 
     Args:
         lib, along, loads, recording: See `columns_along`.
@@ -278,7 +280,7 @@ def _at_once(effect: Effect, sites: np.ndarray) -> list[slice]:
 
 
 def _calls(at: slice) -> Iterator[slice]:
-    """Some samples, as many at a time as one compiled call makes the columns of."""
+    """The samples in parts, each as long as one compiled call has exact columns for."""
     # Nothing has to be run in before the first.
     edges = [at.start, *range(max(at.start, RUN_IN) + NEW, at.stop, NEW), at.stop]
     return (slice(first, last) for first, last in itertools.pairwise(edges))

@@ -93,7 +93,7 @@ def left_notes(
     if not said:
         return []
     return [
-        "Not all of the torque is explained, and nothing that was tried says what the rest depends on. While the joint "
+        "Not all of the torque is explained, and what the rest depends on was not found. While the joint "
         f"moves, the corrected model leaves more than the noise of the sensors on unseen data: {', '.join(said)}."
     ]
 

@@ -15,7 +15,6 @@ import equinox as eqx
 import numpy as np
 
 from irb140_jax import dynamics
-from irb140_jax.arrays import on_device
 from irb140_jax.effects import At
 from irb140_jax.mismatch.columns.along import Loads, Prepared, pieces
 from irb140_jax.mismatch.columns.torques import Named, as_named
@@ -70,8 +69,7 @@ def regressor(at: Point, along: Prepared, samples: slice) -> np.ndarray:
     if at.leaning is None:
         return along.regressor_at(samples)
     r = along.recording
-    moving = (on_device(x[samples]) for x in (r.q, r.qd, r.qdd))
-    return np.asarray(dynamics.regressor_batch(at.leaning, *moving))
+    return np.asarray(dynamics.regressor_batch(at.leaning, r.q[samples], r.qd[samples], r.qdd[samples]))
 
 
 def leaning(at: Point, along: Prepared) -> np.ndarray:

@@ -162,7 +162,7 @@ class _Start:
 
 
 @dataclasses.dataclass(frozen=True)
-class _Made:
+class _Regression:
     """What a round has made of the recordings before it searches.
 
     Attributes:
@@ -186,7 +186,7 @@ class _Made:
     allowed: Space
 
 
-def _made(given: _Given, start: _Start) -> _Made | None:
+def _regression(given: _Given, start: _Start) -> _Regression | None:
     """Columns along the recordings and sums over all rows; None where they have no bounds."""
     at, band, turn = start.at, given.band, start.round
     lib, chosen = start.searched()
@@ -216,7 +216,7 @@ def _made(given: _Given, start: _Start) -> _Made | None:
     sites = [site_of(c) for c in data.candidates]
     barred = [start.dropped.count(site) >= OFTEN or site in start.unproved for site in sites]
     allowed = dataclasses.replace(space, log_prior=np.where(barred, -np.inf, space.log_prior))
-    return _Made(lib, chosen, each, data, extra, noise, space, allowed)
+    return _Regression(lib, chosen, each, data, extra, noise, space, allowed)
 
 
 def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
@@ -226,15 +226,15 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     is named.
     """
     at, from_nominal_model = start.at, partial(_explained, given, dataclasses.replace(start, at=None))
-    made = _made(given, start)
-    if made is None:
+    regression = _regression(given, start)
+    if regression is None:
         # An explanation without bounds is nothing to start from.
         return from_nominal_model()
-    data, space = made.data, made.space
-    search = partial(selected, made.allowed, made.chosen, every_move=start.whole)
+    data, space = regression.data, regression.space
+    search = partial(selected, regression.allowed, regression.chosen, every_move=start.whole)
     best, hyper, visited = search()
-    falling = partial(with_falling_friction, space, data, made.extra[0], given.scales)
-    shifting = partial(with_late_channels, made.allowed, held=at.rests_on if at else frozenset())
+    falling = partial(with_falling_friction, space, data, regression.extra[0], given.scales)
+    shifting = partial(with_late_channels, regression.allowed, held=at.rests_on if at else frozenset())
     found, found_hyper, late = shifting(best, hyper)
     # Slopes at an explanation say nothing of one without what it rests on: under leaning gravity that nothing is named
     # for, inertials can stand for the tilt.
@@ -248,7 +248,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         found, found_hyper, late = shifting(best, hyper)
         from_nominal, late_from_nominal = free.averaged, free.late
     found, found_hyper, falls = falling(found, found_hyper)
-    settles = start.round == MOST_ROUNDS or _sites(data, found) <= _sites(data, made.chosen)
+    settles = start.round == MOST_ROUNDS or _sites(data, found) <= _sites(data, regression.chosen)
     last = start.whole and start.round > 1 and settles
     timing = frozenset((law.effect.slug, law.joints) for law in at.timing) if at else frozenset()
     if last and timing and not from_nominal:
@@ -271,11 +271,12 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     left_open = _rotors_open(space, data, found, found_hyper) if last and given.drive is not None else ()
     members = [data.candidates[i] for i in (*found, *left_open)]
     held = [with_candidates(s, members, r, given.band, load, at)
-            for s, (r, load) in zip(data.stretches, made.each, strict=True)]  # fmt: skip
+            for s, (r, load) in zip(data.stretches, regression.each, strict=True)]  # fmt: skip
     ex = Explanation(
-        made.lib, given.scales, dataclasses.replace(data, stretches=held), made.extra, made.noise, space, space, found,
-        found_hyper, sets, averaged, scale, given.factor, falls, scaled, unproved=start.unproved, times=start.times,
-        payloads=tuple(r.recording.payload for r in start.along),
+        lib=regression.lib, scales=given.scales, data=dataclasses.replace(data, stretches=held),
+        extra=regression.extra, noise=regression.noise, space=space, by_block=space, chosen=found, hyper=found_hyper,
+        sets=sets, averaged=averaged, scale=scale, factor=given.factor, falls=falls, scaled=scaled,
+        unproved=start.unproved, times=start.times, payloads=tuple(r.recording.payload for r in start.along),
         open_rotors=left_open, linearised_at=timing, from_nominal=from_nominal, late=late,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
