@@ -166,7 +166,7 @@ def _diagnosed(
         ex, left = fewer, held_out(fewer, refit)
         corrected = _corrected(data, ex, refit, left, config)
     progress("looking for structure that no effect explains")
-    rest = unexplained(ex, left)
+    rest, slight = unexplained(ex, left, np.hypot(*sensors))
     if (result := _without_unexplained_time(data, ex, left, rest, recordings, config, progress, whole)) is not None:
         return result
     if data.servo is not None:
@@ -181,8 +181,8 @@ def _diagnosed(
     beyond = beyond_file(model, bare.smooth, by_laws)
     matters = reference(ex.lib, ex.scales, data.band.rate)
     seen = visibility(ex, matters)
-    of = Found(data, config.inertial_uncertainty, sensors, ex, proof, found, rest, seen, model, harmful, beyond, stated,
-               fit)  # fmt: skip
+    of = Found(data, config.inertial_uncertainty, sensors, ex, proof, found, rest, slight, seen, model, harmful, beyond,
+               stated, fit)  # fmt: skip
     diagnosis = document(of, provenance(robot, data.recordings, config.options, config.words))
     diagnosis = with_joints_blocked(diagnosis, stops, robot, left_out=False)
     open_ = undecided(ex, found, seen, matters, data.band, config.inertial_uncertainty)

@@ -23,6 +23,7 @@ from irb140_jax.mismatch.output.notes import (
     left_notes,
     notes,
     rest_notes,
+    slight_notes,
     timing_notes,
     unproved_notes,
 )
@@ -67,6 +68,7 @@ class Found:
         proof: Errors on unseen data.
         findings: Named effects.
         rest: Structure that no effect explains.
+        slight: The same, where it is little of the joint's torque.
         seen: How well every other effect could be seen.
         model: The corrected model.
         harmful: Joints whose discrepancy is left out because it makes the error larger, shape (n,).
@@ -83,6 +85,7 @@ class Found:
     proof: HeldOut
     findings: Sequence[Finding]
     rest: Sequence[Structure]
+    slight: Sequence[Structure]
     seen: Seen
     model: CorrectedModel
     harmful: np.ndarray
@@ -232,11 +235,12 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     channels = timing_notes(of.ex) if of.servo is None else [
         *motion_notes(robot, of.fit), *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo)]
     open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
-    scatter, told = np.hypot(*of.sensors), {*missing, *(s.joint for s in of.rest)}
+    scatter, told = np.hypot(*of.sensors), {*missing, *(s.joint for s in (*of.rest, *of.slight))}
     return [
         *of.data.servo_notes, *link_encoder_notes(of.data, of.model, of.findings),
         *harmful_notes(robot, of.harmful), *open_joints,
-        *rest_notes(robot, of.proof, scatter), *left_notes(robot, of.proof, scatter, torque, told),
+        *rest_notes(robot, of.proof, scatter), *slight_notes(robot, of.slight, torque),
+        *left_notes(robot, of.proof, scatter, torque, told),
         *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names, judged),
         *channels, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
         *notes(of.data, of.uncertainty, judged), *gap_notes(robot, gap, torque, lacking),

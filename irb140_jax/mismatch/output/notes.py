@@ -12,6 +12,7 @@ from irb140_jax.mismatch.regression.sufficient_data import Comparison, mostly_lo
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.late_channels import delays_beside
 from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.mismatch.validation.unexplained import Structure
 from irb140_jax.recordings.payload import Payload
 from irb140_jax.robot import Robot
 
@@ -95,6 +96,27 @@ def left_notes(
     return [
         "Not all of the torque is explained, and what the rest depends on was not found. While the joint "
         f"moves, the corrected model leaves more than the noise of the sensors on unseen data: {', '.join(said)}."
+    ]
+
+
+def slight_notes(robot: Robot, slight: Sequence[Structure], torque: np.ndarray) -> list[str]:
+    """A note on structure that no effect explains, where it is little of a joint's torque and more than noise.
+
+    Args:
+        robot: The nominal model.
+        slight: That structure.
+        torque: Size of the joints' torque, shape (n,) [N m or N].
+    """
+    if not slight:
+        return []
+    said = [
+        f"{robot.joint_names[s.joint]} {digits(s.rms)} {'N' if robot.is_slide[s.joint] else 'N m'} RMS "
+        f"({100 * s.rms / max(torque[s.joint], 1e-300):.1f} % of its torque), which depends on {s.variable}"
+        for s in slight
+    ]
+    return [
+        f"Less than {100 * settings.MATERIAL_TORQUE:g} % of the torque, but more than the noise of the sensors, is "
+        f"structure that no effect explains: {'; '.join(said)}."
     ]
 
 

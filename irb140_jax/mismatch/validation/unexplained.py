@@ -63,14 +63,25 @@ class Structure:
     when: When | None = None
 
 
-def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
-    """Joints whose residual, findings taken off, can be predicted on unseen data."""
-    out = []
+def unexplained(ex: Explanation, proof: HeldOut, scatter: np.ndarray) -> tuple[list[Structure], list[Structure]]:
+    """Joints whose residual, findings taken off, can be predicted on unseen data.
+
+    Args:
+        ex: The explanation.
+        proof: Errors on unseen data.
+        scatter: Of the sensors, shape (n,) [N m or N].
+
+    Returns:
+        Those where it is a share of the joint's torque that is worth a person's time, and those where it is less but
+        stands out of the noise of the sensors.
+    """
+    material, slight = list[Structure](), list[Structure]()
     torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
-    rmse = proof.rmse(proof.left)
+    matters, rmse = settings.MATERIAL_TORQUE * torque, proof.rmse(proof.left)
+    shows = np.minimum(matters, settings.ABOVE_NOISE * scatter)
     for j in range(len(torque)):
         rows = _rows(ex, proof, j)
-        least = max(settings.MATERIAL_SHARE, (settings.MATERIAL_TORQUE * torque[j] / max(rmse[j], 1e-100)) ** 2)
+        least = max(settings.MATERIAL_SHARE, (shows[j] / max(rmse[j], 1e-100)) ** 2)
         # No share of so small a residual could matter.
         if len(rows.residual) < 200 or least > 1.0:
             continue
@@ -88,9 +99,10 @@ def unexplained(ex: Explanation, proof: HeldOut) -> list[Structure]:
                 size = float(np.sqrt(share) * rmse[j])
                 both = zip(ex.data.stretches, proof.left, strict=True)
                 when = shortest(ex.data.stretches, [np.where(s.use, r, 0.0)[:, j] for s, r in both], j)
-                out.append(Structure(j, share, p, rivals[best].variable, size, rivals[best].axis, when))
+                structure = Structure(j, share, p, rivals[best].variable, size, rivals[best].axis, when)
+                (material if size >= matters[j] else slight).append(structure)
                 break
-    return out
+    return material, slight
 
 
 def shortest(stretches: list[Stretch], residuals: list[np.ndarray], j: int) -> When | None:
