@@ -3,15 +3,18 @@
 from types import SimpleNamespace
 from typing import Any
 
+import helpers_recordings as made
 import numpy as np
 import pytest
 from scipy import signal
 
 from irb140_jax.mismatch import diagnose, settings
+from irb140_jax.mismatch.output.notes import slight_notes
 from irb140_jax.mismatch.regression.discrepancy import relaxed
 from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.validation import unexplained
 from irb140_jax.mismatch.validation.competitors import Rows, competitors
+from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.mismatch.validation.unexplained import predicted, shortest
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec
@@ -183,3 +186,29 @@ def test_what_goes_with_time_in_repeats_of_a_motion_is_not_said_to_go_with_the_m
     shares = {c.variable: predicted(c, rows.residual[:, None], rows)[0] for c in rivals}
     assert shares.pop("time or on the motion, which repeats of it can't tell apart") > 0.95
     assert max(shares.values()) < 0.1
+
+
+@pytest.mark.parametrize(("size", "scatter", "matters", "slight"), [
+    (0.05, 0.001, True, False), (0.01, 0.001, False, True), (0.01, 0.01, False, False),
+])  # fmt: skip
+def test_structure_of_little_torque_is_told_apart_and_only_above_the_noise_of_the_sensors(
+    size, scatter, matters, slight
+):
+    q, qd, qdd = moving(0.7, 1.1, 1.0)
+    tau = np.cos(q) + 0.1 * qdd
+    columns = {k: x[:, None] for k, x in {"q": q, "qd": qd, "qdd": qdd, "nominal": tau, "tau": tau}.items()}
+    use = np.full((1500, 1), True)
+    one: Any = SimpleNamespace(
+        recording=0, motion=0, t=T, begin=0.0, use=use, unsure=np.zeros((1500, 1)), **columns)  # fmt: skip
+    noise = Noise(np.eye(1, 11), np.full((1, 1), 1e-3), np.full((1, 1), 1e-3), np.ones(1))
+    robot = made.robot(pendulum=True)
+    ex: Any = SimpleNamespace(noise=noise, data=SimpleNamespace(stretches=[one]), lib=SimpleNamespace(robot=robot))
+    law = np.sign(qd) * np.sin(9.0 * np.pi * q)  # as of teeth
+    left = [(size * np.std(tau) * law / np.std(law))[:, None]]
+    proof = HeldOut(left, left, left, left, left, [use], [use], np.zeros(1, dtype=bool))
+    found = unexplained.unexplained(ex, proof, np.array([scatter * np.std(tau)]))
+    assert [len(x) for x in found] == [matters, slight]
+    notes = slight_notes(robot, found[1], np.array([np.std(tau)]))
+    assert len(notes) == slight
+    if slight:
+        assert "% of its torque), which depends on the joint's position and its direction of motion" in notes[0]

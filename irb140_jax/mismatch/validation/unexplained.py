@@ -16,6 +16,7 @@ from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.competitors import Axis, Competitor, Rows, competitors
 from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.mismatch.validation.undecided_joints import torque_size
 
 MOST_ROWS = 20_000  # of a joint: of more, every second, third ... is taken; a log of an hour has ten times as many
 SHIFTS = 99  # circular time shifts that make the null
@@ -76,7 +77,7 @@ def unexplained(ex: Explanation, proof: HeldOut, scatter: np.ndarray) -> tuple[l
         stands out of the noise of the sensors.
     """
     material, slight = list[Structure](), list[Structure]()
-    torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
+    torque = torque_size(proof, [s.tau for s in ex.data.stretches])
     matters, rmse = settings.MATERIAL_TORQUE * torque, proof.rmse(proof.left)
     shows = np.minimum(matters, settings.ABOVE_NOISE * scatter)
     for j in range(len(torque)):
