@@ -13,6 +13,7 @@ EVERYWHERE = ("time_delay", "gravity_tilt", "payload", "contact", "external_wren
 GAIN_WITHIN = 0.05
 # What a note has to speak of besides the joint, so that a repaired sample is no statement about a dead channel.
 OF_THE_LOG = re.compile(r"dead|froz|constant|zero|stuck|differs between|\blate\b|delay|saturat", re.I)
+SLIGHT = "is structure that no effect explains: "  # and after it the joints, in a note
 NOT_A_BODY = re.compile(r"(?:mass|Ixx|Iyy|Izz)[^,;]*? (?:->|to|is|of) -\d[\d.e+-]* kg")
 
 
@@ -109,6 +110,8 @@ def located(line: dict[str, Any]) -> list[tuple[str, str]]:
             continue
         how, joints = "not said", set(h["joints"])
         if any(OF_THE_LOG.search(x) and 2 * sum(j in x for j in joints) >= len(joints) for x in said.get("notes", [])):
+            how = "noted"
+        if any(j in x.partition(SLIGHT)[2] for x in said.get("notes", []) for j in joints):
             how = "noted"
         if any(matches(f, h, ("accept",)) for f in said["findings"]):
             how = "named alike"
