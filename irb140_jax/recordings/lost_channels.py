@@ -83,7 +83,7 @@ def _dead_positions(
         moved = nominal_torques(robot, seen.q + step, seen.qd + step, seen.qdd + step).total - model.total
         reach = np.abs(moved).max(axis=0)
         touched = reach > 1e-9 * np.abs(model.total).max()
-        name, unit = recording.joint_names[j], "N" if robot.is_slide[j] else "N m"
+        name, unit = recording.joint_names[j], robot.torque_units[j]
         by = f"while tau.{name} changes by {np.ptp(here.tau[:, j]):.3g} {unit}, which no joint held there needs"
         if not rows.all():
             t = recording.t[rows]

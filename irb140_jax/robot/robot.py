@@ -122,6 +122,11 @@ class Robot(eqx.Module):
         return len(self.joint_names)
 
     @property
+    def torque_units(self) -> tuple[str, ...]:
+        """Unit of each joint's torque: N m of a hinge, N of a slide."""
+        return tuple("N" if slide else "N m" for slide in self.is_slide)
+
+    @property
     def is_chain(self) -> bool:
         """Whether nothing branches: each link sits on the one before."""
         return self.parent == serial(self.n)

@@ -34,8 +34,8 @@ def certain(robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.nd
     rms = np.sqrt(power / rows)
     listed = [j for j in np.argsort(-power) if power[j] > settings.LISTED_POWER * power.sum()]
     sizes = [
-        f"{rms[j]:.3g} {_unit(robot, j)} RMS on {robot.joint_names[j]} ({_percent(rms[j] / max(logged[j], 1e-300))} of "
-        "its logged torque)"
+        f"{rms[j]:.3g} {robot.torque_units[j]} RMS on {robot.joint_names[j]} ("
+        f"{_percent(rms[j] / max(logged[j], 1e-300))} of its logged torque)"
         for j in listed
     ]
     said = f"Besides the rigid-body model, a torque of {_listed(sizes)} is needed"
@@ -64,15 +64,11 @@ def _mean_by_direction(
             return ""
         mean = rows.mean(axis=0)
         std = np.sqrt(max(mean @ cov @ mean, 0.0))
-        said.append(f"{mean @ w:.3g} +- {std:.1g} {_unit(robot, j)}")
+        said.append(f"{mean @ w:.3g} +- {std:.1g} {robot.torque_units[j]}")
     return (
         f"; it is on average {said[0]} while the joint moves in its positive direction and {said[1]} while it moves in "
         "its negative direction"
     )
-
-
-def _unit(robot: Robot, j: int) -> str:
-    return "N" if robot.is_slide[j] else "N m"
 
 
 def _percent(share: float) -> str:

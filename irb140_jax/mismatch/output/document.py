@@ -219,7 +219,7 @@ def fit_by_joint(robot: Robot, proof: HeldOut, scatter: np.ndarray, *, at_rest: 
 
 
 def _unexplained(robot: Robot, s: Structure, recordings: Sequence[str]) -> Unexplained:
-    name, unit = robot.joint_names[s.joint], "N" if robot.is_slide[s.joint] else "N m"
+    name, unit = robot.joint_names[s.joint], robot.torque_units[s.joint]
     where = f"{name}: {s.rms:.3g} {unit} RMS that no effect explains; it depends on {s.variable}"
     if when := s.when:
         time = f"from {when.begin:.4g} to {when.end:.4g} s of {recordings[when.recording]}"

@@ -85,7 +85,7 @@ def _torque_change(robot: Robot, ex: Explanation, dphi: np.ndarray, k: int) -> s
                       for s, x in zip(ex.data.stretches, change, strict=True)) / rows)  # fmt: skip
     said = []
     for j in np.argsort(-rms)[:2]:
-        unit = "N" if robot.is_slide[j] else "N m"
+        unit = robot.torque_units[j]
         if rms[j] > 0.1 * rms.max():
             said.append(f"{robot.joint_names[j]} by {rms[j]:.3g} {unit} RMS")
     return " and of ".join(said) or "no joint"

@@ -61,7 +61,7 @@ def rest_notes(robot: Robot, proof: HeldOut, scatter: np.ndarray) -> list[str]:
     errors, out = [proof.rmse(x) for x in (proof.nominal, proof.refit, proof.corrected)], []
     large = proof.rmse(proof.corrected, at_rest=True) > settings.ABOVE_NOISE * scatter
     for j in np.flatnonzero(proof.judged & large & (squares[0] > 2.0 * squares[1])):
-        unit = "N" if robot.is_slide[j] else "N m"
+        unit = robot.torque_units[j]
         nominal, refit, corrected = (f"{x[j]:.3g}" for x in errors)
         out.append(
             f"Most of the error of {robot.joint_names[j]} is in rows in which it rests, where dry friction is "
@@ -86,7 +86,7 @@ def left_notes(
     left = proof.rmse(proof.corrected)
     much = left > np.maximum(settings.MATERIAL_TORQUE * torque, settings.ABOVE_NOISE * scatter)
     said = [
-        f"{robot.joint_names[j]} {digits(left[j])} {'N' if robot.is_slide[j] else 'N m'} RMS "
+        f"{robot.joint_names[j]} {digits(left[j])} {robot.torque_units[j]} RMS "
         f"({100 * left[j] / max(torque[j], 1e-300):.0f} % of its torque)"
         for j in np.flatnonzero(proof.judged & much)
         if j not in told
@@ -110,7 +110,7 @@ def slight_notes(robot: Robot, slight: Sequence[Structure], torque: np.ndarray) 
     if not slight:
         return []
     said = [
-        f"{robot.joint_names[s.joint]} {digits(s.rms)} {'N' if robot.is_slide[s.joint] else 'N m'} RMS "
+        f"{robot.joint_names[s.joint]} {digits(s.rms)} {robot.torque_units[s.joint]} RMS "
         f"({100 * s.rms / max(torque[s.joint], 1e-300):.1f} % of its torque), which depends on {s.variable}"
         for s in slight
     ]
@@ -158,9 +158,9 @@ def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out
         "a link of the given model has inertial parameters that no body can have, and the file keeps them")
     return [
         f"On {name} the torque of corrected.xml differs from that of the corrected model by {g:.3g} "
-        f"{'N' if slide else 'N m'} RMS ({100 * g / t:.0f} % of the joint's torque): {reason}. To predict torque, use "
+        f"{unit} RMS ({100 * g / t:.0f} % of the joint's torque): {reason}. To predict torque, use "
         "`irb140 predict`."
-        for name, slide, g, t in zip(robot.joint_names, robot.is_slide, gap, torque, strict=True)
+        for name, unit, g, t in zip(robot.joint_names, robot.torque_units, gap, torque, strict=True)
         if g > settings.NOTABLE_GAP * t > 0.0
     ]
 
@@ -235,7 +235,7 @@ def _discrepancy_of_joint(ex: Explanation, j: int, own: np.ndarray) -> str:
         for k in range(len(GOES_WITH))
     ])  # fmt: skip
     most = int(np.argmax(np.mean(blocks**2, axis=1)))
-    size, unit = float(np.sqrt(np.mean(blocks.sum(axis=0) ** 2))), "N" if robot.is_slide[j] else "N m"
+    size, unit = float(np.sqrt(np.mean(blocks.sum(axis=0) ** 2))), robot.torque_units[j]
     return f"{robot.joint_names[j]} {digits(size)} {unit} RMS, most of it with {GOES_WITH[most]}"
 
 

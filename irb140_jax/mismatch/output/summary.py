@@ -115,7 +115,7 @@ def _worst_error(robot: Robot, found: Sequence[Finding], fit: dict[str, Fit]) ->
     concerned = [name for f in found for name in f.joints if name in judged] or list(judged)
     before = lambda f: (f.rmse_refit if found else f.rmse_nominal) or 0.0  # noqa: E731
     worst = max(concerned, key=lambda name: before(fit[name]) / max(fit[name].noise_floor or 0.0, 1e-12))
-    f, unit = fit[worst], "N" if robot.is_slide[robot.joint_names.index(worst)] else "N m"
+    f, unit = fit[worst], robot.torque_units[robot.joint_names.index(worst)]
     return (
         f"On unseen data the torque error of {worst} while it moves is {f.rmse_nominal:.3g} {unit} RMS with the model "
         "as given, "

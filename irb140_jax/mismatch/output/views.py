@@ -160,7 +160,7 @@ def maps(robot: Robot, ex: Explanation, proof: HeldOut) -> dict[str, Maps]:
             heat_map(q, qd, edges, np.concatenate([r[u, j] for r, u in zip(x, use, strict=True)]))
             for x in (proof.nominal, proof.corrected)
         )
-        out[name] = Maps(edges[0].tolist(), edges[1].tolist(), nominal, corrected, _unit(robot, j))
+        out[name] = Maps(edges[0].tolist(), edges[1].tolist(), nominal, corrected, robot.torque_units[j])
     return out
 
 
@@ -212,7 +212,8 @@ def unexplained_torques(
         torque, qd = (np.concatenate(v) for v in zip(*((y[u], x.qd[u, s.joint]) for u, x, y in rows), strict=True))
         few = np.arange(len(place)) % -(-len(place) // TRACE_POINTS) == 0
         ways = ((place[way].tolist(), torque[way].tolist()) for way in (few & (qd > 0.0), few & (qd < 0.0)))
-        out.append(UnexplainedTorque(robot.joint_names[s.joint], _label(robot, s.axis), _unit(robot, s.joint), *ways))
+        name, unit = robot.joint_names[s.joint], robot.torque_units[s.joint]
+        out.append(UnexplainedTorque(name, _label(robot, s.axis), unit, *ways))
     return tuple(out)
 
 
@@ -226,13 +227,9 @@ def _label(robot: Robot, axis: Axis) -> str:
     length = "m" if slide else "rad"
     return {
         "q": f"position of {name} [{length}]", "qd": f"speed of {name} [{length}/s]",
-        "qdd": f"acceleration of {name} [{length}/s²]", "nominal": f"load of {name} [{_unit(robot, axis.joint)}]",
-        "tau": f"torque of {name} [{_unit(robot, axis.joint)}]", "t": "time since the recording began [s]",
+        "qdd": f"acceleration of {name} [{length}/s²]", "nominal": f"load of {name} [{robot.torque_units[axis.joint]}]",
+        "tau": f"torque of {name} [{robot.torque_units[axis.joint]}]", "t": "time since the recording began [s]",
     }[axis.quantity]  # fmt: skip
-
-
-def _unit(robot: Robot, joint: int) -> str:
-    return "N" if robot.is_slide[joint] else "N m"
 
 
 def ranking(robot: Robot, ex: Explanation) -> tuple[Ranked, ...]:

@@ -50,7 +50,7 @@ def coarse_positions(robot: Robot, by_torque: np.ndarray, by_encoder: np.ndarray
     if not len(coarse):
         return []
     each = ", ".join(
-        f"{robot.joint_names[j]} ({by_encoder[j]:.2g} {'N' if robot.is_slide[j] else 'N m'} from positions, "
+        f"{robot.joint_names[j]} ({by_encoder[j]:.2g} {robot.torque_units[j]} from positions, "
         f"{by_torque[j]:.2g} from torque)" for j in coarse
     )  # fmt: skip
     return [

@@ -56,7 +56,7 @@ def undecidable(
     seconds = np.sum([u.sum(axis=0) for u in proof.use], axis=0) * band.step / band.rate
     out = {}
     for j in np.flatnonzero(proof.judged):
-        name, unit = robot.joint_names[j], "N" if robot.is_slide[j] else "N m"
+        name, unit = robot.joint_names[j], robot.torque_units[j]
         if seconds[j] < settings.FEWEST_SECONDS:
             out[int(j)] = (
                 f"{name} moves for only {seconds[j]:.2g} s: record at least {settings.FEWEST_SECONDS:g} s in which it "
