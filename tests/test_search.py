@@ -64,6 +64,14 @@ def test_an_effect_of_the_whole_arm_is_added_with_another_where_neither_is_worth
     assert search._added(frozenset({4})) == {4, 2, 3}
 
 
+def test_two_are_exchanged_together_at_a_common_joint_or_where_both_are_wrong_zeros():
+    space, _ = planted(0, {})
+    zeros = [dataclasses.replace(space.candidates[i], effect=CATALOGUE["encoder_offset"]) for i in (3, 7)]
+    space = dataclasses.replace(space, candidates=(*space.candidates[:3], zeros[0], *space.candidates[4:7], zeros[1]))
+    search = Search(space, (SETTING, SETTING))
+    assert search._pairs(frozenset({0, 3, 4, 7})) == [(0, 3), (3, 7), (4, 7)]
+
+
 def test_what_a_search_holds_is_in_every_set_it_returns():
     """Two laws that are not there, one of which is held; what is there is found beside it."""
     space, _ = planted(5, {2: 2.0})

@@ -235,13 +235,10 @@ class Search:
         return not self.space.conflicts((one,))[other]
 
     def _pairs(self, now: frozenset[int]) -> list[tuple[int, int]]:
-        """Members at a common joint, or that both move what is beyond their own.
-
-        Not a zero, say, with the friction of another joint: it stands for no part of that.
-        """
-        own, moved = {m: set(self._of(m).joints) for m in now}, {m: self._joints(m) for m in now}
-        beside = lambda m, k: own[m] & own[k] or (moved[m] - own[m] and moved[k] - own[k] and moved[m] & moved[k])  # noqa: E731
-        return [p for p in itertools.combinations(sorted(now), 2) if beside(*p)]
+        """Members at a common joint, and wrong zeros of any two; not a zero with the friction of another joint."""
+        own = {m: set(self._of(m).joints) for m in now}
+        zeros = {m for m in now if own[m] < self._joints(m)}
+        return [p for p in itertools.combinations(sorted(now), 2) if own[p[0]] & own[p[1]] or {*p} <= zeros]
 
     def _on_all_joints(self, now: frozenset[int]) -> frozenset[int]:
         """A kind on every joint at once; another, or one effect of all joints, in the place of all of a kind."""
