@@ -77,33 +77,46 @@ def unexplained(ex: Explanation, proof: HeldOut, scatter: np.ndarray) -> tuple[l
         stands out of the noise of the sensors.
     """
     material, slight = list[Structure](), list[Structure]()
-    torque = torque_size(proof, [s.tau for s in ex.data.stretches])
-    matters, rmse = settings.MATERIAL_TORQUE * torque, proof.rmse(proof.left)
+    matters = settings.MATERIAL_TORQUE * torque_size(proof, [s.tau for s in ex.data.stretches])
     shows = np.minimum(matters, settings.ABOVE_NOISE * scatter)
-    for j in range(len(torque)):
-        rows = _rows(ex, proof, j)
-        least = max(settings.MATERIAL_SHARE, (shows[j] / max(rmse[j], 1e-100)) ** 2)
-        # No share of so small a residual could matter.
-        if len(rows.residual) < 200 or least > 1.0:
-            continue
-        rivals = competitors(ex.data.stretches, j, rows, ex.lib.robot.joint_names)
-        shares = np.array([predicted(c, rows.residual[:, None], rows)[0] for c in rivals])
-        if shares.max() < least:
-            continue
-        null = _null(rivals, rows)
-        # Along a slow sweep position goes with time, and so do copies of the residual shifted in time: where motion is
-        # not beyond chance, what goes with time still is.
-        for best in dict.fromkeys((_carrier(rivals, shares), int(np.argmax(shares)))):
-            share = float(shares[best])
-            p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
-            if share >= least and p <= settings.SIGNIFICANT:
-                size = float(np.sqrt(share) * rmse[j])
-                both = zip(ex.data.stretches, proof.left, strict=True)
-                when = shortest(ex.data.stretches, [np.where(s.use, r, 0.0)[:, j] for s, r in both], j)
-                structure = Structure(j, share, p, rivals[best].variable, size, rivals[best].axis, when)
-                (material if size >= matters[j] else slight).append(structure)
+    for j, rmse in enumerate(proof.rmse(proof.left)):
+        least = [max(settings.MATERIAL_SHARE, float(x[j] / max(rmse, 1e-100)) ** 2) for x in (matters, shows)]
+        sure = _beyond_chance(ex, proof, j, float(rmse), least[1])
+        for found, enough in zip((material, slight), least, strict=True):
+            if large := [s for s in sure if s.share >= enough]:
+                found.append(large[0])
                 break
     return material, slight
+
+
+def _beyond_chance(ex: Explanation, proof: HeldOut, j: int, rmse: float, least: float) -> list[Structure]:
+    """What is left at a joint as the preferred regression predicts it, and as the best does, where that is no chance.
+
+    Args:
+        ex, proof: See `unexplained`.
+        j: The joint.
+        rmse: What is left of it [N m or N].
+        least: Share that must be predicted.
+    """
+    rows = _rows(ex, proof, j)
+    # No share of so small a residual could matter.
+    if len(rows.residual) < 200 or least > 1.0:
+        return []
+    rivals = competitors(ex.data.stretches, j, rows, ex.lib.robot.joint_names)
+    shares = np.array([predicted(c, rows.residual[:, None], rows)[0] for c in rivals])
+    if shares.max() < least:
+        return []
+    null, both = _null(rivals, rows), zip(ex.data.stretches, proof.left, strict=True)
+    when = shortest(ex.data.stretches, [np.where(s.use, r, 0.0)[:, j] for s, r in both], j)
+    out = []
+    # Along a slow sweep position goes with time, and so do copies of the residual shifted in time: where motion is not
+    # beyond chance, what goes with time still is.
+    for best in dict.fromkeys((_carrier(rivals, shares), int(np.argmax(shares)))):
+        share, size = float(shares[best]), float(np.sqrt(max(shares[best], 0.0))) * rmse
+        p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
+        if p <= settings.SIGNIFICANT:
+            out.append(Structure(j, share, p, rivals[best].variable, size, rivals[best].axis, when))
+    return out
 
 
 def shortest(stretches: list[Stretch], residuals: list[np.ndarray], j: int) -> When | None:
