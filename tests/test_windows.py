@@ -65,7 +65,7 @@ def test_a_recording_of_another_length_needs_no_new_program():
     jax.monitoring.register_event_duration_secs_listener(noted)
     jax.jit(lambda x: x + 1.0)(np.zeros(7))
     assert "/compile/" in "".join(built)  # a program that is new is seen
-    columns_along(few, ALONG)
+    columns_along(few, prepared(ROBOT, SMOOTH))
     shorter = condition(dataclasses.replace(LOG, t=LOG.t[:-100], q=LOG.q[:-100], tau=LOG.tau[:-100]), BAND)
     assert len(shorter.t) < len(SMOOTH.t)
     built.clear()

@@ -239,7 +239,7 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     return [
         *of.data.servo_notes, *link_encoder_notes(of.data, of.model, of.findings),
         *harmful_notes(robot, of.harmful), *open_joints,
-        *rest_notes(robot, of.proof, scatter), *slight_notes(robot, of.slight, torque),
+        *rest_notes(robot, of.proof, scatter), *slight_notes(robot, of.slight),
         *left_notes(robot, of.proof, scatter, torque, told),
         *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names, judged),
         *channels, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,

@@ -99,19 +99,18 @@ def left_notes(
     ]
 
 
-def slight_notes(robot: Robot, slight: Sequence[Structure], torque: np.ndarray) -> list[str]:
+def slight_notes(robot: Robot, slight: Sequence[Structure]) -> list[str]:
     """A note on structure that no effect explains, where it is little of a joint's torque and more than noise.
 
     Args:
         robot: The nominal model.
         slight: That structure.
-        torque: Size of the joints' torque, shape (n,) [N m or N].
     """
     if not slight:
         return []
     said = [
         f"{robot.joint_names[s.joint]} {digits(s.rms)} {robot.torque_units[s.joint]} RMS "
-        f"({100 * s.rms / max(torque[s.joint], 1e-300):.1f} % of its torque), which depends on {s.variable}"
+        f"({100 * s.of_torque:.1f} % of its torque), which depends on {s.variable}"
         for s in slight
     ]
     return [

@@ -16,7 +16,6 @@ from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.competitors import Axis, Competitor, Rows, competitors
 from irb140_jax.mismatch.validation.held_out import HeldOut
-from irb140_jax.mismatch.validation.undecided_joints import torque_size
 
 MOST_ROWS = 20_000  # of a joint: of more, every second, third ... is taken; a log of an hour has ten times as many
 SHIFTS = 99  # circular time shifts that make the null
@@ -53,6 +52,7 @@ class Structure:
         rms: Size of the predictable part [N m or N].
         axis: One of them, to draw what is left over it.
         when: Where it is that short.
+        of_torque: Its size over that of the joint's torque, root mean squares.
     """
 
     joint: int
@@ -62,6 +62,7 @@ class Structure:
     rms: float
     axis: Axis
     when: When | None = None
+    of_torque: float = 0.0
 
 
 def unexplained(ex: Explanation, proof: HeldOut, scatter: np.ndarray) -> tuple[list[Structure], list[Structure]]:
@@ -77,14 +78,15 @@ def unexplained(ex: Explanation, proof: HeldOut, scatter: np.ndarray) -> tuple[l
         stands out of the noise of the sensors.
     """
     material, slight = list[Structure](), list[Structure]()
-    matters = settings.MATERIAL_TORQUE * torque_size(proof, [s.tau for s in ex.data.stretches])
+    torque = np.sqrt(np.mean(np.concatenate([s.tau for s in ex.data.stretches]) ** 2, axis=0))
+    matters = settings.MATERIAL_TORQUE * torque
     shows = np.minimum(matters, settings.ABOVE_NOISE * scatter)
     for j, rmse in enumerate(proof.rmse(proof.left)):
         least = [max(settings.MATERIAL_SHARE, float(x[j] / max(rmse, 1e-100)) ** 2) for x in (matters, shows)]
         sure = _beyond_chance(ex, proof, j, float(rmse), least[1])
         for found, enough in zip((material, slight), least, strict=True):
             if large := [s for s in sure if s.share >= enough]:
-                found.append(large[0])
+                found.append(dataclasses.replace(large[0], of_torque=large[0].rms / max(float(torque[j]), 1e-300)))
                 break
     return material, slight
 
