@@ -12,4 +12,4 @@ Pose = Float[Array, "4 4"]
 Inertials = Float[Array, "n 10"]
 Samples = Float[Array, " T"]
 JointSamples = Float[Array, "T n"]
-JointBatch = Float[Array | np.ndarray, "T n"]  # samples that are handed on in chunks, of either library
+JointBatch = Float[Array | np.ndarray, "T n"]  # samples for functions on batches, which take NumPy too

@@ -111,7 +111,9 @@ def located(line: dict[str, Any]) -> list[tuple[str, str]]:
         how, joints = "not said", set(h["joints"])
         if any(OF_THE_LOG.search(x) and 2 * sum(j in x for j in joints) >= len(joints) for x in said.get("notes", [])):
             how = "noted"
-        if any(j in x.partition(SLIGHT)[2] for x in said.get("notes", []) for j in joints):
+        # Of each joint a part that begins with its name; what it depends on may be another joint.
+        slight = [part for x in said.get("notes", []) for part in x.partition(SLIGHT)[2].split("; ")]
+        if any(part.startswith(f"{j} ") for part in slight for j in joints):
             how = "noted"
         if any(matches(f, h, ("accept",)) for f in said["findings"]):
             how = "named alike"

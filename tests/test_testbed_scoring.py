@@ -64,9 +64,9 @@ def test_floors_errors_and_places_are_read_off():
     assert scoring.located(got) == [("odd", "located")]
     assert scoring.located(line([], odd, notes=["a: its torque is constant"])) == [("odd", "noted")]
     assert scoring.located(line([], odd, notes=["a: 3 samples were filled in"])) == [("odd", "not said")]
-    slight = "Less than 2 % of the torque is structure that no effect explains: {} 1 N m RMS, which depends on time."
-    for joint, how in (("a", "noted"), ("b", "not said")):
-        assert scoring.located(line([], odd, notes=[slight.format(joint)])) == [("odd", how)]
+    slight = f"Less than 2 % {scoring.SLIGHT}c 1 N m RMS, which depends on time; {{}} 1 N m RMS, which depends on {{}}."
+    for joint, other, how in (("a", "b", "noted"), ("b", "the motion of a", "not said"), ("ab", "time", "not said")):
+        assert scoring.located(line([], odd, notes=[slight.format(joint, other)])) == [("odd", how)]
     assert scoring.located(line([], odd)) == [("odd", "not said")]
 
 

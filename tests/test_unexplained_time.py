@@ -18,7 +18,7 @@ from irb140_jax.robot import robot_from_model
 
 
 def left(joint: int, when: When | None) -> Structure:
-    return Structure(joint, 0.5, 0.01, "time", 1.0, Axis("t", 0), when)
+    return Structure(joint, 0.5, 0.01, "time", 1.0, 0.1, Axis("t", 0), when)
 
 
 def test_the_time_of_most_joints_is_common_where_theirs_overlap():

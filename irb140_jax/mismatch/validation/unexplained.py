@@ -50,9 +50,9 @@ class Structure:
         p_value: Share of time-shifted copies that are as predictable.
         variable: The variables that carry it, in words.
         rms: Size of the predictable part [N m or N].
+        of_torque: The same over the joint's torque, root mean squares.
         axis: One of them, to draw what is left over it.
         when: Where it is that short.
-        of_torque: Its size over that of the joint's torque, root mean squares.
     """
 
     joint: int
@@ -60,9 +60,9 @@ class Structure:
     p_value: float
     variable: str
     rms: float
+    of_torque: float
     axis: Axis
     when: When | None = None
-    of_torque: float = 0.0
 
 
 def unexplained(ex: Explanation, proof: HeldOut, scatter: np.ndarray) -> tuple[list[Structure], list[Structure]]:
@@ -83,21 +83,23 @@ def unexplained(ex: Explanation, proof: HeldOut, scatter: np.ndarray) -> tuple[l
     shows = np.minimum(matters, settings.ABOVE_NOISE * scatter)
     for j, rmse in enumerate(proof.rmse(proof.left)):
         least = [max(settings.MATERIAL_SHARE, float(x[j] / max(rmse, 1e-100)) ** 2) for x in (matters, shows)]
-        sure = _beyond_chance(ex, proof, j, float(rmse), least[1])
+        sure = _beyond_chance(ex, proof, j, float(rmse), float(torque[j]), least[1])
         for found, enough in zip((material, slight), least, strict=True):
             if large := [s for s in sure if s.share >= enough]:
-                found.append(dataclasses.replace(large[0], of_torque=large[0].rms / max(float(torque[j]), 1e-300)))
+                found.append(large[0])
                 break
     return material, slight
 
 
-def _beyond_chance(ex: Explanation, proof: HeldOut, j: int, rmse: float, least: float) -> list[Structure]:
+def _beyond_chance(
+    ex: Explanation, proof: HeldOut, j: int, rmse: float, torque: float, least: float
+) -> list[Structure]:
     """What is left at a joint as the preferred regression predicts it, and as the best does, where that is no chance.
 
     Args:
         ex, proof: See `unexplained`.
         j: The joint.
-        rmse: What is left of it [N m or N].
+        rmse, torque: What is left of it, and its torque, root mean squares [N m or N].
         least: Share that must be predicted.
     """
     rows = _rows(ex, proof, j)
@@ -117,7 +119,8 @@ def _beyond_chance(ex: Explanation, proof: HeldOut, j: int, rmse: float, least: 
         share, size = float(shares[best]), float(np.sqrt(max(shares[best], 0.0))) * rmse
         p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
         if p <= settings.SIGNIFICANT:
-            out.append(Structure(j, share, p, rivals[best].variable, size, rivals[best].axis, when))
+            part = size / max(torque, 1e-300)
+            out.append(Structure(j, share, p, rivals[best].variable, size, part, rivals[best].axis, when))
     return out
 
 
