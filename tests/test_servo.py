@@ -81,13 +81,15 @@ def test_motors_are_no_servos(tmp_path):
 
 
 def test_rows_at_the_torque_limit_are_left_out_and_counted(robot):
-    recording, torque = closed_loop(two_links(limit=4.0), noise=0.0)
-    limited = dataclasses.replace(recording, drive=stated_drive(np.array(KP), np.array(KD), 4.0))
+    recording, torque = closed_loop(two_links(limit=4.0), noise=0.0, delay=0.005)
+    stated = dataclasses.replace(stated_drive(np.array(KP), np.array(KD), 4.0), delay=np.full(2, 0.005))
+    limited = dataclasses.replace(recording, drive=stated)
     (made,), notes = with_servo_torques([limited], robot, 0.05)
     at_limit = np.abs(torque) > 3.999
     assert made.torque_lost is not None and at_limit[:, 0].any()
     assert made.torque_lost[at_limit].mean() > 0.99
     kept = ~made.torque_lost
+    kept[0] = False  # what was commanded before the log began is not in it
     assert np.abs(made.tau - torque)[kept].max() < 0.1
     assert any(f"{made.torque_lost[:, 0].sum()} of {len(made.t)} rows of shoulder are left out" in n for n in notes)
 
@@ -104,6 +106,20 @@ def test_a_delay_of_all_commands_is_estimated_before_the_search(robot):
     recording, _ = closed_loop(two_links(), delay=0.010)
     (made,), _ = with_servo_torques([dataclasses.replace(recording, drive=STATED)], robot, 0.05)
     np.testing.assert_allclose(drive_of(made).delay, 0.010, atol=5e-4)
+
+
+@pytest.mark.parametrize(("late", "unsure"), [((0.0, 0.0), 0.0), ((0.01, 0.01), 0.0), ((0.0, 0.02), 0.01)])
+def test_joints_that_disagree_on_the_delay_leave_it_open(robot, late, unsure):
+    """Two joints whose commands act 0 and 20 ms late say that the delay of all is 10 ms, give or take 10."""
+    recording, _ = closed_loop(two_links())
+    assert recording.qdes is not None
+    told = [np.interp(recording.t + x, recording.t, wanted) for x, wanted in zip(late, recording.qdes.T, strict=True)]
+    (made,), _ = with_servo_torques(
+        [dataclasses.replace(recording, qdes=np.stack(told, axis=1), drive=STATED)], robot, 0.05)  # fmt: skip
+    drive = drive_of(made)
+    np.testing.assert_allclose(drive.delay, np.mean(late), atol=5e-4)
+    assert drive.common_delay_width == pytest.approx(np.hypot(1e-3, unsure), rel=0.02)
+    assert drive.phase_width == pytest.approx(1e-3 / np.sqrt(12.0))
 
 
 @pytest.mark.parametrize(("delay", "lag", "stated"), [(0.004, 0.0, False), (0.0, 0.006, False), (0.004, 0.006, True)])

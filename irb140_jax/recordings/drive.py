@@ -81,9 +81,9 @@ class Drive:
     def phase_width(self) -> float:
         """Standard deviation of the time at which one recording's commands are taken up beside all others' [s].
 
-        A log begins at any moment of a controller's cycle, whose length is that by which the delay of all is uncertain.
+        A log begins at any moment of a controller's cycle, which is as long as the delay of all is uncertain at least.
         """
-        return float(self.common_delay_width / np.sqrt(12.0))
+        return float(min(self.common_delay_width, COMMON_DELAY_WIDTH) / np.sqrt(12.0))
 
     def found(self, times: Times, later: float | np.ndarray = 0.0, kd: float | np.ndarray = 0.0) -> "Drive":
         """The drive as a fit found it, without the phase of any recording.

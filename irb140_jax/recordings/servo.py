@@ -53,8 +53,8 @@ def with_servo_torques(
                              "torque; give recordings of one kind")
     drives = [r.drive or unknown_drive(robot.n) for r in servos]
     unstated = not any(d.delay.any() for d in drives)
-    delay = estimated_delay(servos, drives, robot, uncertainty) if unstated else 0.0
-    width = COMMON_DELAY_WIDTH if unstated else 0.0
+    delay, disagreement = estimated_delay(servos, drives, robot, uncertainty) if unstated else (0.0, 0.0)
+    width = float(np.hypot(COMMON_DELAY_WIDTH, disagreement)) if unstated else 0.0
     rows = rows_of_joints(servos, drives, robot, (delay,))
     estimates: dict[int, Estimate] = {}
     for j in range(robot.n):

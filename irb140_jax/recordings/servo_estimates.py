@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, special
 from scipy.optimize import nnls
 
 from irb140_jax.recordings.drive import GAIN_WIDTH, Drive
@@ -108,11 +108,14 @@ def _later(r: Recording, d: Drive, delay: float) -> np.ndarray:
 
 def estimated_delay(
     servos: Sequence[Recording], drives: Sequence[Drive], robot: Robot, uncertainty: float
-) -> float:
+) -> tuple[float, float]:
     """Delay of all commands alike beyond what is stated [s], 0 where none is clear: where the search begins.
 
     On slow motion a late command looks like viscous friction, Kp times the delay of it at every joint.  So what is
     known beforehand decides: how well Kd is known, how large friction usually is, and that the delay is one.
+
+    Returns:
+        The delay, and the standard deviation that it has because joints disagree on it by more than each leaves open.
 
     Args:
         servos: Logs of commands.
@@ -122,15 +125,43 @@ def estimated_delay(
     """
     def log_evidence(delays: np.ndarray) -> np.ndarray:
         rows = rows_of_joints(servos, drives, robot, delays.tolist())
-        return np.sum([_log_evidence(r, uncertainty) for r in rows], axis=0)
+        return np.stack([_log_evidence(r, uncertainty) for r in rows])
 
     coarse = np.arange(0.0, LONGEST, COARSE)
-    first = coarse[np.argmax(log_evidence(coarse))]
+    of_joints = log_evidence(coarse)
+    if apart := _of_joints_apart(coarse, of_joints):
+        return apart
+    first = coarse[np.argmax(of_joints.sum(axis=0))]
     fine = np.arange(max(first - COARSE, 0.0), first + COARSE + 0.5 * FINE, FINE)
-    odds = log_evidence(fine)
+    odds = log_evidence(fine).sum(axis=0)
     best, weight = fine[np.argmax(odds)], np.exp(odds - odds.max())
     spread = float(max(np.sqrt(weight @ (fine - best) ** 2 / weight.sum()), FINE))
-    return float(best) if best > CLEAR * spread else 0.0
+    return float(best) if best > CLEAR * spread else 0.0, 0.0
+
+
+def _of_joints_apart(delays: np.ndarray, log_evidence: np.ndarray) -> tuple[float, float] | None:
+    """Mean delay of joints that clearly disagree, and how much less sure it is than if they did not [s].
+
+    Args:
+        delays: Evenly spaced [s], shape (delays,).
+        log_evidence: Of each joint, shape (n, delays).
+
+    Source: DerSimonian and Laird, Meta-analysis in clinical trials, Controlled Clinical Trials 7 (1986).
+    """
+    weight = special.softmax(log_evidence[np.ptp(log_evidence, axis=1) > 0.0], axis=1)
+    others = len(weight) - 1
+    if others < 1:
+        return None
+    own = weight @ delays
+    variance = np.sum(weight * (delays - own[:, None]) ** 2, axis=1) + np.ptp(delays[:2]) ** 2 / 12.0
+    sure = 1.0 / variance
+    pooled = sure @ own / sure.sum()
+    excess = sure @ (own - pooled) ** 2 - others  # more than what chance makes of it, of which this is the scatter:
+    if excess < CLEAR * np.sqrt(2.0 * others):
+        return None
+    less_sure = 1.0 / (variance + excess / (sure.sum() - sure @ sure / sure.sum()))
+    more = 1.0 / less_sure.sum() - 1.0 / sure.sum()
+    return float(less_sure @ own / less_sure.sum()), float(np.sqrt(more))
 
 
 def _log_evidence(rows: Rows, uncertainty: float) -> np.ndarray:

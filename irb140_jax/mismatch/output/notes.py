@@ -86,8 +86,7 @@ def left_notes(
     left = proof.rmse(proof.corrected)
     much = left > np.maximum(settings.MATERIAL_TORQUE * torque, settings.ABOVE_NOISE * scatter)
     said = [
-        f"{robot.joint_names[j]} {digits(left[j])} {robot.torque_units[j]} RMS "
-        f"({100 * left[j] / max(torque[j], 1e-300):.0f} % of its torque)"
+        _size(robot, int(j), left[j], left[j] / max(torque[j], 1e-300))
         for j in np.flatnonzero(proof.judged & much)
         if j not in told
     ]
@@ -108,15 +107,16 @@ def slight_notes(robot: Robot, slight: Sequence[Structure]) -> list[str]:
     """
     if not slight:
         return []
-    said = [
-        f"{robot.joint_names[s.joint]} {digits(s.rms)} {robot.torque_units[s.joint]} RMS "
-        f"({100 * s.of_torque:.1f} % of its torque), which depends on {s.variable}"
-        for s in slight
-    ]
+    said = [f"{_size(robot, s.joint, s.rms, s.of_torque)}, which depends on {s.variable}" for s in slight]
     return [
         f"Less than {100 * settings.MATERIAL_TORQUE:g} % of the torque, but more than the noise of the sensors, is "
         f"structure that no effect explains: {'; '.join(said)}."
     ]
+
+
+def _size(robot: Robot, j: int, rms: float, of_torque: float) -> str:
+    return (f"{robot.joint_names[j]} {digits(rms)} {robot.torque_units[j]} RMS "
+            f"({digits(100 * of_torque, 2)} % of its torque)")
 
 
 def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
