@@ -1,11 +1,9 @@
 """Do the commands of a log belong to its positions?  Unit, sign and joint, judged without any model."""
 
-import dataclasses
-
 import numpy as np
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.glance import glance
+from irb140_jax.recordings.glance import at_a_glance
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.robot import Robot
 
@@ -22,8 +20,8 @@ def check_commands(recording: Recording, robot: Robot) -> None:
         RecordingError: One of them, beyond doubt.
     """
     assert recording.qdes is not None
-    seen = glance(dataclasses.replace(recording, tau=recording.qdes))
-    q, wanted, names, n = seen.q, seen.tau, recording.joint_names, robot.n
+    q, wanted = (at_a_glance(recording.t, x) for x in (recording.q, recording.qdes))
+    names, n = recording.joint_names, robot.n
     step = float(recording.t[-1] - recording.t[0]) / len(q)
     alike = _correlations(q, wanted, int(LATEST / step))
     for j in range(n):

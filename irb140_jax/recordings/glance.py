@@ -37,28 +37,34 @@ class Glance(NamedTuple):
 
 def glance(recording: Recording) -> Glance:
     """Resample evenly, low-pass with zero phase, differentiate, thin out."""
-    t = recording.t
+    t, logged = recording.t, (recording.qd, recording.qdd)
+    grid, picked = _instants(t)
+    q, step = _smooth(t, recording.q), grid[1] - grid[0]
+    qd = np.gradient(q, step, axis=0)
+    qdd = np.gradient(qd, step, axis=0)
+    tau = at_a_glance(t, recording.tau) if recording.has_torque else np.full((SAMPLES, q.shape[1]), np.nan)
+    logged_qd, logged_qdd = (None if x is None else at_a_glance(t, x) for x in logged)
+    return Glance(q[picked], qd[picked], qdd[picked], tau, logged_qd, logged_qdd, np.ptp(q, axis=0), grid[picked])
+
+
+def at_a_glance(t: Float[np.ndarray, " T"], x: Float[np.ndarray, "T n"]) -> Float[np.ndarray, "S n"]:
+    """Signals as `glance` smooths and thins those of a recording with times t [s]."""
+    return _smooth(t, x)[_instants(t)[1]]
+
+
+def _instants(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """An even grid over a recording, and which of its instants are looked at, (SAMPLES,)."""
     step = float(np.median(np.diff(t)))
     # Evenly by the median step, yet never more than twice the samples there are: gaps may be long.
     grid = np.linspace(t[0], t[-1], min(round((t[-1] - t[0]) / step) + 1, 2 * len(t)))
+    ends = min(round(ENDS / (grid[1] - grid[0])), len(grid) // 10)
+    return grid, np.linspace(ends, len(grid) - 1 - ends, SAMPLES).round().astype(int)
+
+
+def _smooth(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Columns low-passed on that grid."""
+    grid, _ = _instants(t)
     step = grid[1] - grid[0]
     sos = signal.butter(2, min(CUTOFF, 0.2 / step) * 2 * step, output="sos")
-
-    ends = min(round(ENDS / step), len(grid) // 10)
-    picked = np.linspace(ends, len(grid) - 1 - ends, SAMPLES).round().astype(int)
-
-    def smooth(x: np.ndarray) -> np.ndarray:
-        return signal.sosfiltfilt(sos, np.interp(grid, t, x), padlen=min(len(grid) - 1, round(ENDS / step)))
-
-    def seen(x: np.ndarray | None) -> np.ndarray | None:
-        return None if x is None else np.stack([smooth(own)[picked] for own in x.T], axis=1)
-
-    (q, qd, qdd), travel = np.empty((3, SAMPLES, recording.q.shape[1])), np.empty(recording.q.shape[1])
-    for j, own in enumerate(recording.q.T):
-        position = smooth(own)
-        speed = np.gradient(position, step)
-        q[:, j], qd[:, j], qdd[:, j] = (x[picked] for x in (position, speed, np.gradient(speed, step)))
-        travel[j] = np.ptp(position)
-    tau = seen(recording.tau if recording.has_torque else None)
-    tau = np.full_like(q, np.nan) if tau is None else tau
-    return Glance(q, qd, qdd, tau, seen(recording.qd), seen(recording.qdd), travel, grid[picked])
+    even = np.stack([np.interp(grid, t, own) for own in x.T], axis=1)
+    return signal.sosfiltfilt(sos, even, axis=0, padlen=min(len(grid) - 1, round(ENDS / step)))

@@ -6,7 +6,6 @@ m is the torque of the nominal model; none of Kp, Fc, Kd + Fv and J is negative.
 known of Kd and of friction beforehand, and from that part of the motion which goes with the command.
 """
 
-import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,7 +14,7 @@ from scipy import linalg, special
 from scipy.optimize import nnls
 
 from irb140_jax.recordings.drive import GAIN_WIDTH, Drive
-from irb140_jax.recordings.glance import glance
+from irb140_jax.recordings.glance import at_a_glance, glance
 from irb140_jax.recordings.payload import carrying
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.torques import nominal_torques
@@ -74,7 +73,7 @@ def rows_of_joints(
     for r, d in zip(servos, drives, strict=True):
         seen = glance(r)
         total = nominal_torques(carrying(robot, r.payload), seen.q, seen.qd, seen.qdd).total
-        smooth = lambda x, r=r, d=d: glance(dataclasses.replace(r, tau=_later(r, d, x))).tau  # noqa: E731
+        smooth = lambda x, r=r, d=d: at_a_glance(r.t, _later(r, d, x))  # noqa: E731
         late, told = [smooth(x) - seen.q for x in delays], [smooth(x) for x in BEFORE]
         for j in range(robot.n):
             qd = seen.qd[:, j]
