@@ -113,14 +113,14 @@ def estimated_delay(
     On slow motion a late command looks like viscous friction, Kp times the delay of it at every joint.  So what is
     known beforehand decides: how well Kd is known, how large friction usually is, and that the delay is one.
 
-    Returns:
-        The delay, and the standard deviation that it has because joints disagree on it by more than each leaves open.
-
     Args:
         servos: Logs of commands.
         drives: What is stated of the servos, one a log.
         robot: The nominal model.
         uncertainty: Relative standard deviation of its inertials.
+
+    Returns:
+        The delay, and the standard deviation that it has because joints disagree on it by more than each leaves open.
     """
     def log_evidence(delays: np.ndarray) -> np.ndarray:
         rows = rows_of_joints(servos, drives, robot, delays.tolist())
@@ -152,10 +152,11 @@ def _of_joints_apart(delays: np.ndarray, log_evidence: np.ndarray) -> tuple[floa
     if others < 1:
         return None
     own = weight @ delays
-    variance = np.sum(weight * (delays - own[:, None]) ** 2, axis=1) + np.ptp(delays[:2]) ** 2 / 12.0
+    # No joint's delay is known better than to the space between those that are tried.
+    variance = np.sum(weight * (delays - own[:, None]) ** 2, axis=1) + (delays[1] - delays[0]) ** 2 / 12.0
     sure = 1.0 / variance
     pooled = sure @ own / sure.sum()
-    excess = sure @ (own - pooled) ** 2 - others  # more than what chance makes of it, of which this is the scatter:
+    excess = sure @ (own - pooled) ** 2 - others  # joints that agree have none, give or take the root of 2 `others`
     if excess < CLEAR * np.sqrt(2.0 * others):
         return None
     less_sure = 1.0 / (variance + excess / (sure.sum() - sure @ sure / sure.sum()))
