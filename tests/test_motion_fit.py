@@ -14,7 +14,7 @@ from scipy import stats
 import irb140_jax as irb
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import DiagnoseConfig, diagnose
-from irb140_jax.mismatch.motion.fit import FREEDOM, _improvement, _information, _student, _weights
+from irb140_jax.mismatch.motion.fit import FREEDOM, MotionFit, _improvement, _information, _student, _weights
 from irb140_jax.recordings import stated_drive
 
 sys.path.insert(0, str(ROOT / "experiments"))
@@ -67,6 +67,12 @@ def test_windows_that_are_wrong_alike_tell_as_much_as_one(repeats):
     given = np.tile(own, (len(scores), 1, 1)), scores, np.arange(motions).repeat(repeats).tolist(), np.zeros(2)
     told = _information(*given, free)  # pyright: ignore[reportArgumentType]: what it asks of free parameters
     assert abs(told - 1.0 / repeats) < 0.1 / repeats
+
+
+@pytest.mark.parametrize(("left", "holds"), [((0.2, 0.1), True), ((0.2, 0.0), False)])
+def test_a_fit_that_leaves_nothing_of_an_effect_is_another_explanation(left, holds):
+    fit = MotionFit(None, {}, {k: np.array([x]) for k, x in enumerate(left)}, lambda drive: drive, 0.0, {}, {}, 0.1)  # pyright: ignore[reportArgumentType]: not asked for
+    assert fit.holds_all_named == holds
 
 
 # --- whole diagnoses -------------------------------------------------------------------------------------------------

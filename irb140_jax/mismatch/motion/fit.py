@@ -66,6 +66,11 @@ class MotionFit:
     rotors: dict[int, tuple[float, float]]
     improvement: float
 
+    @property
+    def holds_all_named(self) -> bool:
+        """Whether something is left of every effect that the torque shows: without one it is another explanation."""
+        return all(w.any() for w in self.amplitudes.values())
+
 
 def fit_to_motion(
     data: Comparison, ex: Explanation, of_fold: Callable[[int], CorrectedModel], blocks: Sequence[np.ndarray],
@@ -82,7 +87,8 @@ def fit_to_motion(
         model: Corrected model of the torque.
 
     Returns:
-        The fit; None where nothing can be simulated, or simulations of unseen motions err as much with it.
+        The fit; None where nothing can be simulated, simulations of unseen motions err as much with it, or it leaves
+        nothing of an effect.
     """
     cut = windows(list(unseen), [r.t for r in data.smooth])
     if not cut:
@@ -101,7 +107,8 @@ def fit_to_motion(
             left_out[fold] = own.model(found.without([w.fold == fold for w in cut], own))
         improvement = _improvement(motions.of_folds(left_out), before)
         if improvement > (best.improvement if best else 0.0):
-            best = _as_found(free, found, left_out, improvement)
+            made = _as_found(free, found, left_out, improvement)
+            best = made if made.holds_all_named else best
     return best
 
 
