@@ -81,7 +81,7 @@ class Drive:
     def phase_width(self) -> float:
         """Standard deviation of the time at which one recording's commands are taken up beside all others' [s].
 
-        A log begins at any moment of a controller's cycle, which is as long as the delay of all is uncertain at least.
+        A log begins at any moment of a controller's cycle of a millisecond.  None where the delay was stated.
         """
         return float(min(self.common_delay_width, COMMON_DELAY_WIDTH) / np.sqrt(12.0))
 

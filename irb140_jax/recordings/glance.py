@@ -39,7 +39,7 @@ def glance(recording: Recording) -> Glance:
     """Resample evenly, low-pass with zero phase, differentiate, thin out."""
     t, logged = recording.t, (recording.qd, recording.qdd)
     grid, picked = _instants(t)
-    q, step = _smooth(t, recording.q), grid[1] - grid[0]
+    q, step = _smooth(t, recording.q, grid), grid[1] - grid[0]
     qd = np.gradient(q, step, axis=0)
     qdd = np.gradient(qd, step, axis=0)
     tau = at_a_glance(t, recording.tau) if recording.has_torque else np.full((SAMPLES, q.shape[1]), np.nan)
@@ -49,7 +49,8 @@ def glance(recording: Recording) -> Glance:
 
 def at_a_glance(t: Float[np.ndarray, " T"], x: Float[np.ndarray, "T n"]) -> Float[np.ndarray, "S n"]:
     """Signals as `glance` smooths and thins those of a recording with times t [s]."""
-    return _smooth(t, x)[_instants(t)[1]]
+    grid, picked = _instants(t)
+    return _smooth(t, x, grid)[picked]
 
 
 def _instants(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -61,9 +62,8 @@ def _instants(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return grid, np.linspace(ends, len(grid) - 1 - ends, SAMPLES).round().astype(int)
 
 
-def _smooth(t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Columns low-passed on that grid."""
-    grid, _ = _instants(t)
+def _smooth(t: np.ndarray, x: np.ndarray, grid: np.ndarray) -> np.ndarray:
+    """Columns low-passed on an even grid."""
     step = grid[1] - grid[0]
     sos = signal.butter(2, min(CUTOFF, 0.2 / step) * 2 * step, output="sos")
     even = np.stack([np.interp(grid, t, own) for own in x.T], axis=1)

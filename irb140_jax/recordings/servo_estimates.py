@@ -145,6 +145,9 @@ def _of_joints_apart(delays: np.ndarray, log_evidence: np.ndarray) -> tuple[floa
         delays: Evenly spaced [s], shape (delays,).
         log_evidence: Of each joint, shape (n, delays).
 
+    Returns:
+        The mean, and the standard deviation that it has because they disagree [s]; None where they agree.
+
     Source: DerSimonian and Laird, Meta-analysis in clinical trials, Controlled Clinical Trials 7 (1986).
     """
     weight = special.softmax(log_evidence[np.ptp(log_evidence, axis=1) > 0.0], axis=1)
