@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy import signal
+from scipy import signal, special
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import DiagnoseConfig, Result, diagnose, predict
@@ -251,3 +251,14 @@ def test_a_wrong_zero_of_a_first_joint_that_bears_the_arm_is_not_named_a_tilt_of
     (finding,) = diagnose(robot, case.recordings, DiagnoseConfig(effects=library)).diagnosis.findings
     assert (finding.effect, finding.joints) == ("encoder_offset", ("joint1",))
     assert finding.parameters["offset"].value == pytest.approx(0.03, rel=0.1)
+
+
+def test_a_tilt_is_not_taken_back_because_wrong_inertials_could_stand_for_it_where_gravity_leans():
+    robot, case = machine(101, 2, 0.3, Concealment("gravity_tilt", (), 0.06))
+    diagnosis = diagnose(robot, case.recordings).diagnosis
+    (finding,) = diagnosis.findings
+    assert finding.effect == "gravity_tilt"
+    sure = finding.evidence
+    assert sure.probability is not None and sure.log_odds == pytest.approx(special.logit(sure.probability), abs=1.0)
+    assert sure.heldout_gain is not None and sure.heldout_gain > 0.9
+    assert diagnosis.fit["joint2"].rmse_corrected < 0.02 * diagnosis.fit["joint2"].rmse_refit

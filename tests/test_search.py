@@ -11,6 +11,7 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch.regression.gram import LEVELS, ONE
 from irb140_jax.mismatch.selection.averages import in_its_place, probabilities
 from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.selection.hyperparameters import possible
 from irb140_jax.mismatch.selection.screening import gains, reshaped
 from irb140_jax.mismatch.selection.search import Search
 from irb140_jax.mismatch.selection.selected import named, selected
@@ -127,7 +128,25 @@ def test_without_a_member_that_held_another_ones_shape_in_place_that_one_takes_a
     assert 4 not in Search(space, hyper).run((0, 4))
 
 
-def test_odds_of_a_finding_without_which_others_are_inadmissible_are_those_against_the_best_set_visited():
+def test_a_shape_is_given_up_only_after_all_others_at_which_a_screening_would_have_it(monkeypatch):
+    """Columns 4 to 6 are shapes of one law; of the whole set only the last may be, and a screening allows all."""
+    space, _ = planted(6, {0: 2.0, 4: 2.0})
+    candidates = list(space.candidates)
+    for k in (4, 5, 6):
+        candidates[k] = dataclasses.replace(candidates[4], shape=np.array([float(k)]), columns=np.array([k]))
+    space, hyper = dataclasses.replace(space, candidates=tuple(candidates)), (SETTING, SETTING)
+    cannot_be = lambda chosen, _: [c for c in chosen if c in (4, 5)]  # noqa: E731
+    monkeypatch.setattr(type(space), "inadmissible", lambda _, *args: cannot_be(*args))
+    judge = lambda chosen: (-np.inf if cannot_be(chosen, hyper) else 0.0, hyper)  # noqa: E731
+    for start in (4, 5):
+        assert possible(space, (0, start), judge, fewer=True) == (0, 6)
+    never = lambda _: (-np.inf, hyper)  # noqa: E731
+    monkeypatch.setattr(type(space), "inadmissible", lambda _, chosen, hyper: [c for c in chosen if c in (4, 5, 6)])
+    assert possible(space, (0, 4), never, fewer=True) == (0,)
+
+
+def test_odds_of_a_finding_are_those_against_sets_that_say_something_of_it():
+    """Where others are inadmissible without it, and where slopes at an explanation that rests on it say nothing."""
     space, _ = planted(1, {})
     sets = {frozenset({0, 1}): -3.0, frozenset({1}): -np.inf, frozenset({2}): -9.0, frozenset(): -12.0}
     data = SimpleNamespace(candidates=space.candidates)
@@ -137,4 +156,8 @@ def test_odds_of_a_finding_without_which_others_are_inadmissible_are_those_again
         others=lambda index: tuple(i for i in (0, 1) if i != index),
         log_posterior=lambda chosen, joints: sets[frozenset(chosen)],
     )  # fmt: skip
+    ex.judged_by = lambda _: ex
     assert Explanation.log_odds(ex, 0) == pytest.approx(6.0)  # pyright: ignore[reportArgumentType]
+    nominal = SimpleNamespace(sets={frozenset({0}): -1.0, frozenset(): -3.0})
+    ex.judged_by = lambda _: nominal
+    assert Explanation.log_odds(ex, 0) == pytest.approx(2.0)  # pyright: ignore[reportArgumentType]

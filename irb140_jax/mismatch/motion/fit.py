@@ -7,11 +7,13 @@ many moments of the recordings, and these are changed until it follows the posit
     the amplitudes of what is named, where it acts on a joint and in the simulation; rotors that the torque leaves open;
     each servo's torque gain beside its stated Kp and Kd; its Kd; the time at which commands act
 
-What the torque says is their prior.  Gauss-Newton with finite differences of MuJoCo's simulation.  The
-parameters are kept where simulations of motions that the fit did not see err less with them.
+What the torque says is their prior, in either of the ways of `free`.  Gauss-Newton with finite differences of
+MuJoCo's simulation.  Of all fits the one is kept whose simulations of motions that it did not see err least, and none
+where those err as much as with the torque's own parameters.
 """
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -20,7 +22,7 @@ from scipy import linalg, optimize
 
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file
-from irb140_jax.mismatch.motion.free import ChangedModel, FreeParameters
+from irb140_jax.mismatch.motion.free import ChangedModel, FreeParameters, as_estimated, as_predicted
 from irb140_jax.mismatch.motion.inputs import Inputs, time_steps
 from irb140_jax.mismatch.motion.laws import without_those
 from irb140_jax.mismatch.motion.models import Simulated, followers, leading, led, positions_of, simulated_corrected
@@ -99,8 +101,8 @@ def fit_to_motion(
         return None
     before = motions.of_folds({w.fold: (of_fold(w.fold), lambda drive: drive, 0.0) for w in cut})
     best = None
-    for rotors in dict.fromkeys(((), ex.open_rotors)):
-        free, left_out = FreeParameters.of(ex, model, data, rotors), {}
+    for rotors, saying in itertools.product(dict.fromkeys(((), ex.open_rotors)), (as_predicted, as_estimated)):
+        free, left_out = FreeParameters.of(ex, model, data, rotors, saying), {}
         found = _fitted(free, motions)
         for fold in dict.fromkeys(w.fold for w in cut):
             own = free.centred(blocks[fold])

@@ -1,4 +1,9 @@
-"""Parameters of a corrected model that are free in a fit to the motion, and their prior."""
+"""Parameters of a corrected model that are free in a fit to the motion, and their prior.
+
+The torque of commands has two things to say of them.  `as_predicted` takes the stated gains as right, as what
+predicts torque does: friction may hold what is wrong with them, and torque gains have the stated width of Kp.
+`as_estimated` is the posterior of laws and gains together: where masses say what Kp is, friction is in that torque.
+"""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -21,6 +26,52 @@ JITTER = 1e-9  # on the diagonal of a correlation matrix, where the torque can't
 
 # A corrected model, what makes its drive of a recording's, and by how much later that acts [s].
 ChangedModel = tuple[CorrectedModel, Callable[[Drive], Drive], float]
+
+
+class Said(NamedTuple):
+    """What the torque says of a model's numbers.
+
+    Attributes:
+        post: Inertials and amplitudes, in prior units.
+        gains: Real over stated torque of each servo, less one, and its standard deviation, shape (n, 2); the latter
+            is zero where there is no Kp.
+        kd: Kd of each beyond that of the drive that was found, and its standard deviation, shape (n, 2).
+    """
+
+    post: Posterior
+    gains: np.ndarray
+    kd: np.ndarray
+
+
+Saying = Callable[[Explanation, Drive, np.ndarray | None], Said]
+
+
+def as_predicted(ex: Explanation, drive: Drive, without: np.ndarray | None) -> Said:
+    """The gains as stated.
+
+    Args:
+        ex: The explanation.
+        drive: As it was given.
+        without: Which blocks of the data are left out, shape (blocks,).
+    """
+    post, _, _ = ex.prediction(without)
+    kd = [width * ex.own_nuisance(j, DRIVE_KD)[1] for j, width in enumerate(np.nan_to_num(drive.kd_width))]
+    about_none = lambda width: np.stack([np.zeros(len(kd)), width], axis=1)  # noqa: E731
+    return Said(post, about_none(np.nan_to_num(drive.kp_width)), about_none(kd))
+
+
+def as_estimated(ex: Explanation, drive: Drive, without: np.ndarray | None) -> Said:
+    """Gains and laws together; arguments as those of `as_predicted`."""
+    post, (_, _, own) = ex.posterior(without=without), ex.prediction(without)
+    post = dataclasses.replace(post, mean=ex.of_bodies(post.mean, post.cov, ex.chosen, ex.space.inertials))
+    gains, kd = np.zeros((2, len(drive.kp), 2))
+    for j, (width, (found, _)) in enumerate(zip(np.nan_to_num(drive.kd_width), ex.of_drives(own), strict=True)):
+        more, unsure = ex.kp_scale(j, drive, without)
+        if np.nan_to_num(drive.kp_width[j]) > 0.0:
+            gains[j] = 1.0 / (1.0 + more) - 1.0, unsure / (1.0 + more) ** 2
+        mean, std = ex.own_nuisance(j, DRIVE_KD, without)
+        kd[j] = width * (mean - found), width * std
+    return Said(post, gains, kd)
 
 
 class FreeParameter(NamedTuple):
@@ -47,6 +98,8 @@ class FreeParameters:
         low, high: Bounds, shape (P,).
         base: The corrected model, with those rotors, whose parameters they are.
         ex: The explanation with the rotors among what is chosen.
+        drive: The servos as they were given.
+        saying: What the torque says of the parameters.
     """
 
     parameters: tuple[FreeParameter, ...]
@@ -57,21 +110,26 @@ class FreeParameters:
     high: np.ndarray
     base: CorrectedModel
     ex: Explanation
+    drive: Drive
+    saying: Saying
 
     @staticmethod
-    def of(ex: Explanation, model: CorrectedModel, data: Comparison, rotors: Sequence[int]) -> "FreeParameters":
-        """Those of a corrected model; the torque says what their prior is, torque gains have the stated width of Kp.
+    def of(
+        ex: Explanation, model: CorrectedModel, data: Comparison, rotors: Sequence[int], saying: Saying
+    ) -> "FreeParameters":
+        """Those of a corrected model, with what the torque says of them as prior.
 
         Args:
             ex: The explanation.
             model: The corrected model.
             data: Model and recordings.
             rotors: Candidates that stand beside what is named.
+            saying: What the torque says.
         """
         assert data.servo is not None
-        ex = dataclasses.replace(ex, chosen=(*ex.chosen, *rotors))
-        post, _, _ = ex.prediction()
-        base = _with_posterior(ex, model, post)
+        ex, drive = dataclasses.replace(ex, chosen=(*ex.chosen, *rotors)), data.servo.drive
+        said = saying(ex, drive, None)
+        post = said.post
         laws, widths, at = [], [], 0
         for i, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
             c = ex.data.candidates[i]
@@ -82,12 +140,10 @@ class FreeParameters:
                 kind = "rotor" if i in rotors else "law"
                 laws += [(FreeParameter(kind, at, k), part.start + k, *ends) for k, ends in bounds]
             at += 1
-        drive, (gain,) = data.servo.drive, TORQUE_GAIN.law.parameters
-        kp_width = np.nan_to_num(drive.kp_width).tolist()
-        for j in range(model.robot.n):
-            kd = float(np.nan_to_num(drive.kd_width[j])) * ex.own_nuisance(j, DRIVE_KD)[1]
-            widths += [(FreeParameter("torque_gain", j), kp_width[j], gain.low - 1.0, gain.high - 1.0)]
-            widths += [(FreeParameter("kd", j), kd, -float(drive.kd[j]), np.inf)]
+        (gain,) = TORQUE_GAIN.law.parameters
+        for j, (of_kp, of_kd) in enumerate(zip(said.gains[:, 1].tolist(), said.kd[:, 1].tolist(), strict=True)):
+            widths += [(FreeParameter("torque_gain", j), of_kp, gain.low - 1.0, gain.high - 1.0)]
+            widths += [(FreeParameter("kd", j), of_kd, -float(drive.kd[j]), np.inf)]
         if drive.common_delay_width:
             widths += [(FreeParameter("later", -1), ex.command_delay(drive)[1], -float(np.min(drive.delay)), np.inf)]
         widths = [x for x in widths if x[1] > 0.0]
@@ -101,16 +157,22 @@ class FreeParameters:
         unit = np.concatenate([std, [x[1] for x in widths]])
         low, high = (np.array([x[k] for x in (*laws, *widths)]) / unit for k in (2, 3))
         parameters = (*(x[0] for x in laws), *(x[0] for x in widths))
-        return FreeParameters(parameters, unit, np.zeros(len(unit)), precision, low, high, base, ex)._at(base)
+        bare = FreeParameters(
+            parameters, unit, np.zeros(len(unit)), precision, low, high, model, ex, drive, saying)  # fmt: skip
+        return bare._about(said)
 
-    def _at(self, base: CorrectedModel) -> "FreeParameters":
-        """The same about another model with these effects."""
-        own = [base.named[w.at].amplitudes[w.column] if w.kind in ("law", "rotor") else 0.0 for w in self.parameters]
+    def _about(self, said: Said) -> "FreeParameters":
+        """The same about other numbers of the same model."""
+        made = fitted_model(self.ex, said.post, (), said.post, 0.0, self.base.band)
+        base = dataclasses.replace(self.base, phi_corrected=made.phi_corrected, named=made.named, discrepancy=None)
+        of_servos = {"torque_gain": said.gains[:, 0], "kd": said.kd[:, 0], "later": np.zeros(1)}
+        own = [of_servos[w.kind][w.at] if w.kind in of_servos else base.named[w.at].amplitudes[w.column]
+               for w in self.parameters]  # fmt: skip
         return dataclasses.replace(self, base=base, mean=np.clip(np.array(own) / self.unit, self.low, self.high))
 
     def centred(self, blocks: np.ndarray) -> "FreeParameters":
         """The same about what the torque says without some blocks of the data, shape (blocks,)."""
-        return self._at(_with_posterior(self.ex, self.base, self.ex.prediction(blocks)[0]))
+        return self._about(self.saying(self.ex, self.drive, blocks))
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """In SI units, shape (P,)."""
@@ -151,9 +213,3 @@ class FreeParameters:
             if what.kind == "law":
                 out.setdefault(index[what.at], self.base.named[what.at].amplitudes.copy())[what.column] = value
         return out
-
-
-def _with_posterior(ex: Explanation, model: CorrectedModel, post: Posterior) -> CorrectedModel:
-    """A corrected model with inertials and effects of another posterior."""
-    made = fitted_model(ex, post, (), post, 0.0, model.band)
-    return dataclasses.replace(model, phi_corrected=made.phi_corrected, named=made.named, discrepancy=None)

@@ -11,7 +11,7 @@ from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.motion import MotionFit
 from irb140_jax.mismatch.records import digits
 from irb140_jax.mismatch.regression.gaussian import log_odds_of_any
-from irb140_jax.mismatch.regression.nuisances import COMMAND_DELAY, DRIVE_KD, FIXED
+from irb140_jax.mismatch.regression.nuisances import COMMAND_DELAY, DRIVE_KD
 from irb140_jax.mismatch.result import Estimate, Finding
 from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.recordings.condition import Commanded, Conditioned
@@ -114,23 +114,13 @@ def _by_real_kp(ex: Explanation, servo: Commanded, f: Finding) -> dict[str, Esti
     effect, names = ex.lib.effects[f.effect], list(ex.lib.robot.joint_names)
     if not (effect.place.is_friction or effect.place.at is At.ASKED):
         return f.parameters
-    doubt = max(float(np.hypot(*kp_scale(ex, servo, names.index(joint)))) for joint in f.joints)
+    doubt = max(float(np.hypot(*ex.kp_scale(names.index(joint), servo.drive))) for joint in f.joints)
     of_torque = {p.name for p in effect.law.parameters if p.unit.startswith("{tau}")}
     return {
         k: dataclasses.replace(p, std=float(np.hypot(p.std, p.value * doubt)))
         if k in of_torque and p.value is not None and p.std is not None else p
         for k, p in f.parameters.items()
     }  # fmt: skip
-
-
-def kp_scale(ex: Explanation, servo: Commanded, j: int) -> tuple[float, float]:
-    """Stated over real Kp of a joint, less one, and its standard deviation: what the masses of the model say of it."""
-    shared = np.zeros((1, len(ex.space.set_columns(ex.chosen))))
-    shared[0, ex.space.inertials] = settings.GAIN_COMMON
-    width = float(np.hypot(settings.GAIN_JOINT, np.nan_to_num(servo.drive.kp_width[j])))
-    own = width * (np.arange(len(ex.space.joints[j].groups)) == FIXED.index("gain"))[None]
-    mean, cov = ex.space.functions(ex.chosen, ex.hyper, j, shared, own)
-    return float(mean[0]), float(np.sqrt(cov[0, 0]))
 
 
 def by_known_payload(
@@ -147,7 +137,7 @@ def by_known_payload(
         made: The same with drives whose gains are complete.
     """
     n, out = ex.lib.robot.n, []
-    more = np.array([kp_scale(ex, servo, j)[0] for j in range(n)])
+    more = np.array([ex.kp_scale(j, servo.drive)[0] for j in range(n)])
     for r, m in zip(given, made, strict=True):
         assert m.drive is not None
         stated = r.drive or unknown_drive(n)
@@ -192,14 +182,14 @@ def gain_notes(ex: Explanation, servo: Commanded) -> list[str]:
     if shown:
         each = []
         for j in shown:
-            more, unsure = kp_scale(ex, servo, j)
+            more, unsure = ex.kp_scale(j, servo.drive)
             kp, unit = servo.drive.kp[j] / (1.0 + more), "N/m" if ex.lib.robot.is_slide[j] else "N m/rad"
             each.append(f"{digits(kp, 4)} +- {digits(kp * unsure, 1)} {unit} on {ex.lib.robot.joint_names[j]}")
         return [f"By what the known payload adds to the torque, Kp is {', '.join(each)}."]
     known = [j for j, said in enumerate(servo.drive.said) if said in ("model", "map")]
     if not known:
         return []
-    each = [(ex.lib.robot.joint_names[j], *kp_scale(ex, servo, j)) for j in known]
+    each = [(ex.lib.robot.joint_names[j], *ex.kp_scale(j, servo.drive)) for j in known]
     said = ", ".join(f"{name} {100 / (1 + more):.0f} +- {100 * unsure:.0f} %" for name, more, unsure in each)
     return [
         f"By the masses of the model Kp is really, in parts of what is stated: {said}. Friction and limits are found "

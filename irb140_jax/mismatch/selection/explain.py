@@ -1,7 +1,7 @@
 """The loop at the heart of a diagnosis: columns, noise, search, and again with finer shapes and the corrected load."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -29,13 +29,13 @@ from irb140_jax.mismatch.regression.rows import (
 from irb140_jax.mismatch.regression.silent import silent_rows
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
-from irb140_jax.mismatch.selection.averages import Sets, Site, site_of
+from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.explanation import Explanation, fitted
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
 from irb140_jax.mismatch.selection.finer_shapes import is_coarse, nearest_shape, refined
 from irb140_jax.mismatch.selection.hyperparameters import settled
-from irb140_jax.mismatch.selection.late_channels import Late, with_late_channels
+from irb140_jax.mismatch.selection.late_channels import with_late_channels
 from irb140_jax.mismatch.selection.screening import gains
 from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_left, selected
 from irb140_jax.mismatch.selection.space import space_of
@@ -238,34 +238,36 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     found, found_hyper, late = shifting(best, hyper)
     # Slopes at an explanation say nothing of one without what it rests on: under leaning gravity that nothing is named
     # for, inertials can stand for the tilt.
-    from_nominal: Sets = {}
-    late_from_nominal: Mapping[Site, Late] = {}
+    nominal: Explanation | None = None
     if at and not at.rests_on <= _sites(data, found):
         free, last = from_nominal_model()
         if not at.rests_on <= _sites(free.data, free.chosen):
             return free, last
         best, hyper, visited = search(held=at.rests_on)
         found, found_hyper, late = shifting(best, hyper)
-        from_nominal, late_from_nominal = free.averaged, free.late
+        nominal = free
     found, found_hyper, falls = falling(found, found_hyper)
     settles = start.round == MOST_ROUNDS or _sites(data, found) <= _sites(data, regression.chosen)
     last = start.whole and start.round > 1 and settles
-    timing = frozenset((law.effect.slug, law.joints) for law in at.timing) if at else frozenset()
-    if last and timing and not from_nominal:
-        free, other = from_nominal_model()
-        if not timing <= _sites(free.data, free.chosen):
-            return free, other
-        from_nominal, late_from_nominal = free.averaged, free.late
     sets = averaged = {s: value for s, (value, _) in visited.items()}
     scale, scaled = scale_of(space), False
     if last:
         averaged = beside_scale(space, visited) if given.drive is None else sets
-        every = named((*space.candidates, scale), averaged)
+        of_all = (*space.candidates, scale)
+        sites = lambda s: {site_of(of_all[i]) for i in s}  # noqa: E731
+        every, searched = named(of_all, averaged), at.rests_on - set(late) if at else frozenset()
+        if at and nominal is None and (at.timing or not searched <= sites(every)):
+            free, other = from_nominal_model()
+            if not at.rests_on <= _sites(free.data, free.chosen):
+                return free, other
+            nominal = free
+            averaged = {s: x for s, x in averaged.items() if searched <= sites(s)}
+            every = named(of_all, averaged)
         stated = tuple(i for i in every if i < len(space.candidates))
         scaled = stated != every
         found, found_hyper, late = shifting(stated, hyper if stated == best else settled(space, stated, hyper)[1])
         found, found_hyper, falls = falling(found, found_hyper)
-        late = {site: late_from_nominal.get(site, why) for site, why in late.items()}
+        late = {site: nominal.late.get(site, why) if nominal else why for site, why in late.items()}
     for joint in space.joints:
         joint.forget()
     left_open = _rotors_open(space, data, found, found_hyper) if last and given.drive is not None else ()
@@ -277,7 +279,8 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
         extra=regression.extra, noise=regression.noise, space=space, by_block=space, chosen=found, hyper=found_hyper,
         sets=sets, averaged=averaged, scale=scale, factor=given.factor, falls=falls, scaled=scaled,
         unproved=start.unproved, times=start.times, payloads=tuple(r.recording.payload for r in start.along),
-        open_rotors=left_open, linearised_at=timing, from_nominal=from_nominal, late=late,
+        open_rotors=left_open, rests_on=at.rests_on if at else frozenset(), late=late,
+        nominal=_without_rows(nominal, given.sensors) if last and nominal else None,
     )  # fmt: skip
     return (_by_block(ex, given.sensors) if last else ex), last
 
@@ -356,6 +359,13 @@ def _by_block(ex: Explanation, sensors: np.ndarray) -> Explanation:
     columns = ex.columns((*ex.chosen, *ex.open_rotors))
     joints = grams_by_block(ex.data, ex.extra, ex.noise, sensors, columns, settings.BLOCKS)
     return dataclasses.replace(ex, by_block=dataclasses.replace(ex.space, joints=joints))
+
+
+def _without_rows(ex: Explanation, sensors: np.ndarray) -> Explanation:
+    """What is left of an explanation that others are judged by: its rows and all Gram matrices would be as many again.
+    """
+    ex = ex if ex.by_block is not ex.space else _by_block(ex, sensors)
+    return dataclasses.replace(ex, space=ex.by_block, data=dataclasses.replace(ex.data, stretches=[]), extra=[])
 
 
 def _physics(found: tuple[np.ndarray, list[Candidate], list[np.ndarray]]) -> list[Named]:

@@ -14,7 +14,7 @@ from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gaussian import Posterior
 from irb140_jax.mismatch.regression.gram import LEVELS
 from irb140_jax.mismatch.regression.noise import Noise
-from irb140_jax.mismatch.regression.nuisances import COMMON, DRIVE, Nuisances
+from irb140_jax.mismatch.regression.nuisances import COMMON, DRIVE, FIXED, Nuisances
 from irb140_jax.mismatch.selection.averages import Sets, Site, in_its_place, probabilities, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
 from irb140_jax.mismatch.selection.falling_friction import Fall
@@ -52,10 +52,9 @@ class Explanation:
         rigid: The fit of the inertials alone, from all blocks of the data or all but some: it predicts where nothing is
             named.  None in logs of commands, where drives err beside it.
         open_rotors: Rotors that are not named and that the torque of servos leaves open, for a fit to the motion.
-        linearised_at: Lags and delays at which the regression is linearised: what slopes there say of sets without
-            them is wrong.
-        from_nominal: Log posterior of every set that a search with slopes at the nominal model visited, where there are
-            such effects.
+        rests_on: Effects that are in the explanation at which the regression is linearised: what slopes there say of
+            sets without them is wrong.
+        nominal: The explanation by slopes at the nominal model, without its rows, where there are such effects.
         late: Members that are named because their channel is certainly early or late.
     """
 
@@ -79,8 +78,8 @@ class Explanation:
     payloads: tuple[Payload | None, ...] = ()
     rigid: Callable[[np.ndarray | None], Posterior] | None = None
     open_rotors: tuple[int, ...] = ()
-    linearised_at: frozenset[Site] = frozenset()
-    from_nominal: Sets = dataclasses.field(default_factory=dict)
+    rests_on: frozenset[Site] = frozenset()
+    nominal: "Explanation | None" = None
     late: Mapping[Site, Late] = dataclasses.field(default_factory=dict)
 
     @property
@@ -192,11 +191,36 @@ class Explanation:
         """Lag of all torques behind what commands and positions say [s]; none comes before."""
         return max(self.times.lag + self._common(self.space.inertials + 1, LAG_WIDTH)[0], 0.0)
 
-    def own_nuisance(self, j: int, which: int) -> tuple[float, float]:
-        """One of a joint's own nuisance parameters and its standard deviation, both in prior standard deviations."""
-        shared = np.zeros((1, len(self.space.set_columns(self.chosen))))
-        own = (np.arange(len(self.space.joints[j].groups)) == which)[None].astype(float)
-        mean, cov = self.space.functions(self.chosen, self.hyper, j, shared, own)
+    def own_nuisance(self, j: int, which: int, without: np.ndarray | None = None) -> tuple[float, float]:
+        """One of a joint's own nuisance parameters and its standard deviation, both in prior standard deviations.
+
+        Args:
+            j: The joint.
+            which: Of its own nuisances.
+            without: Which blocks of the data are left out, shape (blocks,).
+        """
+        return self._of_joint(j, which, 1.0, 0.0, without)
+
+    def kp_scale(self, j: int, drive: Drive, without: np.ndarray | None = None) -> tuple[float, float]:
+        """Stated over real Kp of a servo, less one, and its standard deviation: what the masses of the model say of it.
+
+        Args:
+            j: The joint.
+            drive: As it was given.
+            without: Which blocks of the data are left out, shape (blocks,).
+        """
+        width = float(np.hypot(settings.GAIN_JOINT, np.nan_to_num(drive.kp_width[j])))
+        return self._of_joint(j, FIXED.index("gain"), width, settings.GAIN_COMMON, without)
+
+    def _of_joint(
+        self, j: int, which: int, width: float, of_all: float, without: np.ndarray | None
+    ) -> tuple[float, float]:
+        """One of a joint's own nuisances times a width, beside the scale of all torques times another."""
+        space = self.space if without is None else self.by_block.without(without)
+        shared = np.zeros((1, len(space.set_columns(self.chosen))))
+        shared[0, space.inertials] = of_all
+        own = width * (np.arange(len(space.joints[j].groups)) == which)[None]
+        mean, cov = space.functions(self.chosen, self.hyper, j, shared, own)
         return float(mean[0]), float(np.sqrt(cov[0, 0]))
 
     def phases(self, stated: Drive) -> tuple[np.ndarray, np.ndarray]:
@@ -291,11 +315,16 @@ class Explanation:
     def log_odds(self, index: int) -> float:
         """Log posterior odds of a finding against the set without it; of friction also against ordinary friction.
 
-        Where others are inadmissible without it, against the best set without it that the search visited.
+        Where others are inadmissible without it, against the best set without it that the search visited; where slopes
+        say nothing of sets without it, of the best sets that a search without those slopes visited.
         """
         if why := self.falls.get(index) or self._late(index):
             return why.log_odds
         every, c, rest = self.data.candidates, self.data.candidates[index], self.others(index)
+        here = {i for i, o in enumerate(every) if site_of(o) == site_of(c)}
+        best = lambda sets, there: max((x for s, x in sets.items() if bool(s & here) == there), default=-np.inf)  # noqa: E731
+        if (judge := self.judged_by(index)) is not self:
+            return best(judge.sets, True) - best(judge.sets, False)
         options = [rest]
         if c.effect.place.is_friction and not c.effect.prior.ordinary:
             taken = {site_of(m) for m in self.members}
@@ -304,8 +333,7 @@ class Explanation:
         joints = list(self.space.reach(index))
         without = max(self.log_posterior(o, joints) for o in options)
         if not np.isfinite(without):
-            here = {i for i, o in enumerate(every) if site_of(o) == site_of(c)}
-            without = max((value for other, value in self.sets.items() if not other & here), default=-np.inf)
+            without = best(self.sets, False)
         return self.log_posterior(self.chosen, joints) - without
 
     def probability(self, index: int) -> float:
@@ -333,8 +361,11 @@ class Explanation:
 
     def _sets(self, index: int) -> Sets:
         """Log posterior of sets with a chosen candidate and without it."""
-        there = self.from_nominal and site_of(self.averaged_over[index]) in self.linearised_at
-        return self.from_nominal if there else self.averaged
+        return self.judged_by(index).averaged
+
+    def judged_by(self, index: int) -> "Explanation":
+        """The explanation whose slopes say something of sets without a chosen candidate."""
+        return self.nominal if self.nominal and site_of(self.averaged_over[index]) in self.rests_on else self
 
 
 def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:

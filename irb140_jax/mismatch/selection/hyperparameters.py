@@ -47,12 +47,13 @@ def possible(
         judge: Log posterior of a set, sizes and levels: see `settled`.
         fewer: Whether members without any possible shape are left out.
     """
-    seen = set[tuple[int, ...]]()
+    seen, tried = set[tuple[int, ...]](), set[int]()
     while not np.isfinite((judged := judge(chosen))[0]):
         seen.add(chosen)
-        other = reshaped(space, chosen, judged[1])
+        tried.update(bad := space.inadmissible(chosen, judged[1]))
+        other = reshaped(space, chosen, judged[1], tried)
         if other in seen and fewer:
-            other = tuple(i for i in chosen if i not in space.inadmissible(chosen, judged[1]))
+            other = tuple(i for i in chosen if i not in bad)
         if other in seen:
             break
         chosen = other

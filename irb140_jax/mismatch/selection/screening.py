@@ -1,6 +1,6 @@
 """What a candidate would add to a set, with sizes and levels as they are."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from scipy import linalg
@@ -73,12 +73,23 @@ def _gains(space: Space, chosen: Sequence[int], hyper: Hyper, which: np.ndarray,
     return out
 
 
-def reshaped(space: Space, chosen: Sequence[int], hyper: Hyper) -> tuple[int, ...]:
-    """The set with the best other shape for each member whose amplitudes can't be at its own, if there is one."""
+def reshaped(
+    space: Space, chosen: Sequence[int], hyper: Hyper, tried: Collection[int] = ()
+) -> tuple[int, ...]:
+    """The set with the best other shape for each member whose amplitudes can't be at its own, if there is one.
+
+    Args:
+        space: What may be in a set.
+        chosen: The set.
+        hyper: Sizes and levels beside it.
+        tried: Shapes at which amplitudes were found that can't be: those of a whole set, beside which widths are
+            settled, differ a little from those that a screening sees.
+    """
     now = list(chosen)
     for c in space.inadmissible(chosen, hyper):
         rest = tuple(i for i in now if i != c)
-        gained = gains(space, rest, hyper, np.array(space.alike[c]))
+        others = [i for i in space.alike[c] if i != c and i not in tried]
+        gained = gains(space, rest, hyper, np.array(others, dtype=int))
         if np.isfinite(gained).any():
-            now = [*rest, space.alike[c][int(np.argmax(gained))]]
+            now = [*rest, others[int(np.argmax(gained))]]
     return tuple(sorted(now))

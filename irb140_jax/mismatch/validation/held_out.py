@@ -1,6 +1,7 @@
 """Does it hold on data that the fit did not see?  Motions, or blocks of a single one, are left out in turn."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -230,10 +231,8 @@ def held_out_gains(ex: Explanation) -> dict[int, float]:
     Of all joints together, over the error of the set without it.  Its noise is that of the whole set, so that inertials
     then go as far from what is stated as they have to: much further than those of `Refit`.
     """
-    left_out = folds(ex)
-    whole = _unseen_errors(ex, ex.chosen, left_out).sum()
-    without = {i: _unseen_errors(ex, ex.others(i), left_out).sum() for i in ex.chosen}
-    return {i: float((error - whole) / max(error, 1e-300)) for i, error in without.items()}
+    both = {i: (w.sum(), o.sum()) for i, (w, o) in _with_and_without(ex, ex.chosen, folds(ex)).items()}
+    return {i: float((without - whole) / max(without, 1e-300)) for i, (whole, without) in both.items()}
 
 
 def unproved(ex: Explanation) -> list[Site]:
@@ -248,9 +247,8 @@ def unproved(ex: Explanation) -> list[Site]:
     if all(np.isin(recording[~fold], recording[fold]).any() for fold in left_out):
         return []
     rows = np.array([float(g.rows.sum()) for g in ex.by_block.joints])
-    whole, against = _unseen_errors(ex, ex.chosen, left_out), {}
-    for i in filter(lambda i: _is_rare(ex, i), ex.chosen):
-        without = _unseen_errors(ex, ex.others(i), left_out)
+    rare, against = [i for i in ex.chosen if _is_rare(ex, i)], {}
+    for i, (whole, without) in _with_and_without(ex, rare, left_out).items():
         against[i] = 0.5 * float(np.sum(rows * np.log((whole + 1e-300) / (without + 1e-300))))
         against[i] += float(ex.space.lost([i], ex.hyper)[0])
     most, worst = np.log(settings.NAMED / (1.0 - settings.NAMED)), sorted(against, key=lambda i: -against[i])[:1]
@@ -261,6 +259,21 @@ def _is_rare(ex: Explanation, index: int) -> bool:
     """Whether a finding is an effect that few robots have, named for its law."""
     c = ex.data.candidates[index]
     return not (c.effect.prior.ordinary or c.is_inertials or index in ex.falls)
+
+
+def _with_and_without(
+    ex: Explanation, which: Sequence[int], left_out: list[np.ndarray]
+) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Whitened squared error on data that the fit did not see, with a finding and without it, by joint, (n,) each."""
+    whole: dict[bool, np.ndarray] = {}
+    out = {}
+    for i in which:
+        judge, site = ex.judged_by(i), site_of(ex.data.candidates[i])
+        mine = next(k for k in judge.chosen if site_of(judge.data.candidates[k]) == site)
+        if (here := judge is ex) not in whole:
+            whole[here] = _unseen_errors(judge, judge.chosen, left_out)
+        out[i] = whole[here], _unseen_errors(judge, judge.others(mine), left_out)
+    return out
 
 
 def _unseen_errors(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> np.ndarray:
