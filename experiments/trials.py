@@ -18,6 +18,7 @@ import time
 from typing import Literal
 
 import numpy as np
+import study_provenance
 import trials_report
 import tyro
 from unseen import unseen_errors
@@ -154,6 +155,7 @@ def judged(kind: Kind, seed: int) -> dict:
         "seed": seed, "row": row, "joints_of_robot": robot.n, "truth": case.truth["effects"], "found": d["findings"],
         "verdict": d["verdict"], "unexplained": d["unexplained"], "fit": d["fit"], "oracle": None,
         "not_testable": d["not_testable"], **unseen_errors(result.model, case, noise), "seconds": seconds,
+        "engine": study_provenance.commit(),
     }  # fmt: skip
     told = {e["effect"] for e in case.truth["effects"]} & set(CATALOGUE)
     # Beside them their special cases: an oracle without them would call dry friction asymmetric whatever the data say.
