@@ -261,4 +261,5 @@ def test_a_tilt_is_not_taken_back_because_wrong_inertials_could_stand_for_it_whe
     sure = finding.evidence
     assert sure.probability is not None and sure.log_odds == pytest.approx(special.logit(sure.probability), abs=1.0)
     assert sure.heldout_gain is not None and sure.heldout_gain > 0.9
-    assert diagnosis.fit["joint2"].rmse_corrected < 0.02 * diagnosis.fit["joint2"].rmse_refit
+    fit = diagnosis.to_json()["fit"]["joint2"]
+    assert fit["rmse_corrected"] < 0.02 * fit["rmse_refit"]
