@@ -91,12 +91,12 @@ def test_what_masses_say_of_gains_is_in_one_of_the_priors(robot):
     assert data.servo is not None
     some = recordings_of_blocks(ex) == 0
     stated, *found = (
-        says(ex, data.servo.drive, without)
-        for says, without in ((as_predicted, None), (as_estimated, None), (as_estimated, some))
+        prior_of(ex, data.servo.drive, without)
+        for prior_of, without in ((as_predicted, None), (as_estimated, None), (as_estimated, some))
     )
     np.testing.assert_array_equal(stated.gains, [[0.0, w] for w in data.servo.drive.kp_width])
-    for said in found:
-        off, width = (said.gains - [-0.2, 0.0]).T
+    for prior in found:
+        off, width = (prior.gains - [-0.2, 0.0]).T
         assert (np.abs(off) < 2.0 * width).all() and (width < 0.6 * data.servo.drive.kp_width).all()
 
 

@@ -101,8 +101,8 @@ def fit_to_motion(
         return None
     before = motions.of_folds({w.fold: (of_fold(w.fold), lambda drive: drive, 0.0) for w in cut})
     best = None
-    for rotors, saying in itertools.product(dict.fromkeys(((), ex.open_rotors)), (as_predicted, as_estimated)):
-        free, left_out = FreeParameters.of(ex, model, data, rotors, saying), {}
+    for rotors, prior_of in itertools.product(dict.fromkeys(((), ex.open_rotors)), (as_predicted, as_estimated)):
+        free, left_out = FreeParameters.of(ex, model, data, rotors, prior_of), {}
         found = _fitted(free, motions)
         for fold in dict.fromkeys(w.fold for w in cut):
             own = free.centred(blocks[fold])

@@ -28,7 +28,7 @@ JITTER = 1e-9  # on the diagonal of a correlation matrix, where the torque can't
 ChangedModel = tuple[CorrectedModel, Callable[[Drive], Drive], float]
 
 
-class Said(NamedTuple):
+class Prior(NamedTuple):
     """What the torque says of a model's numbers.
 
     Attributes:
@@ -43,10 +43,11 @@ class Said(NamedTuple):
     kd: np.ndarray
 
 
-Saying = Callable[[Explanation, Drive, np.ndarray | None], Said]
+# From an explanation, the servos as they were given, and which blocks of the data are left out, shape (blocks,).
+PriorOf = Callable[[Explanation, Drive, np.ndarray | None], Prior]
 
 
-def as_predicted(ex: Explanation, drive: Drive, without: np.ndarray | None) -> Said:
+def as_predicted(ex: Explanation, drive: Drive, without: np.ndarray | None) -> Prior:
     """The gains as stated.
 
     Args:
@@ -57,10 +58,10 @@ def as_predicted(ex: Explanation, drive: Drive, without: np.ndarray | None) -> S
     post, _, _ = ex.prediction(without)
     kd = [width * ex.own_nuisance(j, DRIVE_KD)[1] for j, width in enumerate(np.nan_to_num(drive.kd_width))]
     about_none = lambda width: np.stack([np.zeros(len(kd)), width], axis=1)  # noqa: E731
-    return Said(post, about_none(np.nan_to_num(drive.kp_width)), about_none(kd))
+    return Prior(post, about_none(np.nan_to_num(drive.kp_width)), about_none(kd))
 
 
-def as_estimated(ex: Explanation, drive: Drive, without: np.ndarray | None) -> Said:
+def as_estimated(ex: Explanation, drive: Drive, without: np.ndarray | None) -> Prior:
     """Gains and laws together; arguments as those of `as_predicted`."""
     post, (_, _, own) = ex.posterior(without=without), ex.prediction(without)
     post = dataclasses.replace(post, mean=ex.of_bodies(post.mean, post.cov, ex.chosen, ex.space.inertials))
@@ -71,7 +72,7 @@ def as_estimated(ex: Explanation, drive: Drive, without: np.ndarray | None) -> S
             gains[j] = 1.0 / (1.0 + more) - 1.0, unsure / (1.0 + more) ** 2
         mean, std = ex.own_nuisance(j, DRIVE_KD, without)
         kd[j] = width * (mean - found), width * std
-    return Said(post, gains, kd)
+    return Prior(post, gains, kd)
 
 
 class FreeParameter(NamedTuple):
@@ -99,7 +100,7 @@ class FreeParameters:
         base: The corrected model, with those rotors, whose parameters they are.
         ex: The explanation with the rotors among what is chosen.
         drive: The servos as they were given.
-        saying: What the torque says of the parameters.
+        prior_of: How the prior follows from the torque.
     """
 
     parameters: tuple[FreeParameter, ...]
@@ -111,11 +112,11 @@ class FreeParameters:
     base: CorrectedModel
     ex: Explanation
     drive: Drive
-    saying: Saying
+    prior_of: PriorOf
 
     @staticmethod
     def of(
-        ex: Explanation, model: CorrectedModel, data: Comparison, rotors: Sequence[int], saying: Saying
+        ex: Explanation, model: CorrectedModel, data: Comparison, rotors: Sequence[int], prior_of: PriorOf
     ) -> "FreeParameters":
         """Those of a corrected model, with what the torque says of them as prior.
 
@@ -124,12 +125,12 @@ class FreeParameters:
             model: The corrected model.
             data: Model and recordings.
             rotors: Candidates that stand beside what is named.
-            saying: What the torque says.
+            prior_of: How their prior follows from the torque.
         """
         assert data.servo is not None
         ex, drive = dataclasses.replace(ex, chosen=(*ex.chosen, *rotors)), data.servo.drive
-        said = saying(ex, drive, None)
-        post = said.post
+        prior = prior_of(ex, drive, None)
+        post = prior.post
         laws, widths, at = [], [], 0
         for i, part in zip(ex.chosen, parts(ex.data, ex.chosen), strict=True):
             c = ex.data.candidates[i]
@@ -141,7 +142,7 @@ class FreeParameters:
                 laws += [(FreeParameter(kind, at, k), part.start + k, *ends) for k, ends in bounds]
             at += 1
         (gain,) = TORQUE_GAIN.law.parameters
-        for j, (of_kp, of_kd) in enumerate(zip(said.gains[:, 1].tolist(), said.kd[:, 1].tolist(), strict=True)):
+        for j, (of_kp, of_kd) in enumerate(zip(prior.gains[:, 1].tolist(), prior.kd[:, 1].tolist(), strict=True)):
             widths += [(FreeParameter("torque_gain", j), of_kp, gain.low - 1.0, gain.high - 1.0)]
             widths += [(FreeParameter("kd", j), of_kd, -float(drive.kd[j]), np.inf)]
         if drive.common_delay_width:
@@ -158,21 +159,21 @@ class FreeParameters:
         low, high = (np.array([x[k] for x in (*laws, *widths)]) / unit for k in (2, 3))
         parameters = (*(x[0] for x in laws), *(x[0] for x in widths))
         bare = FreeParameters(
-            parameters, unit, np.zeros(len(unit)), precision, low, high, model, ex, drive, saying)  # fmt: skip
-        return bare._about(said)
+            parameters, unit, np.zeros(len(unit)), precision, low, high, model, ex, drive, prior_of)  # fmt: skip
+        return bare._about(prior)
 
-    def _about(self, said: Said) -> "FreeParameters":
+    def _about(self, prior: Prior) -> "FreeParameters":
         """The same about other numbers of the same model."""
-        made = fitted_model(self.ex, said.post, (), said.post, 0.0, self.base.band)
+        made = fitted_model(self.ex, prior.post, (), prior.post, 0.0, self.base.band)
         base = dataclasses.replace(self.base, phi_corrected=made.phi_corrected, named=made.named, discrepancy=None)
-        of_servos = {"torque_gain": said.gains[:, 0], "kd": said.kd[:, 0], "later": np.zeros(1)}
+        of_servos = {"torque_gain": prior.gains[:, 0], "kd": prior.kd[:, 0], "later": np.zeros(1)}
         own = [of_servos[w.kind][w.at] if w.kind in of_servos else base.named[w.at].amplitudes[w.column]
                for w in self.parameters]  # fmt: skip
         return dataclasses.replace(self, base=base, mean=np.clip(np.array(own) / self.unit, self.low, self.high))
 
     def centred(self, blocks: np.ndarray) -> "FreeParameters":
         """The same about what the torque says without some blocks of the data, shape (blocks,)."""
-        return self._about(self.saying(self.ex, self.drive, blocks))
+        return self._about(self.prior_of(self.ex, self.drive, blocks))
 
     def values(self, x: np.ndarray) -> np.ndarray:
         """In SI units, shape (P,)."""

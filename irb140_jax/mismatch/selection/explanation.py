@@ -323,7 +323,7 @@ class Explanation:
         every, c, rest = self.data.candidates, self.data.candidates[index], self.others(index)
         here = {i for i, o in enumerate(every) if site_of(o) == site_of(c)}
         best = lambda sets, there: max((x for s, x in sets.items() if bool(s & here) == there), default=-np.inf)  # noqa: E731
-        if (judge := self.judged_by(index)) is not self:
+        if (judge := self.judged_by(index)) is not self:  # with the same candidates: both searched one library
             return best(judge.sets, True) - best(judge.sets, False)
         options = [rest]
         if c.effect.place.is_friction and not c.effect.prior.ordinary:
