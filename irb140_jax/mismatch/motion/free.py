@@ -35,7 +35,8 @@ class Prior(NamedTuple):
         post: Inertials and amplitudes, in prior units.
         gains: Real over stated torque of each servo, less one, and its standard deviation, shape (n, 2); the latter
             is zero where there is no Kp.
-        kd: Kd of each beyond that of the drive that was found, and its standard deviation, shape (n, 2).
+        kd: Kd of each beyond that of the drive that was found, and its standard deviation, shape (n, 2) [N m s/rad or
+            N s/m].
     """
 
     post: Posterior
