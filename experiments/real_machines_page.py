@@ -9,6 +9,7 @@ import pathlib
 import re
 
 import hidden_in_real_recordings as hidden
+import numpy as np
 import tyro
 
 PAGE = pathlib.Path(__file__).resolve().parents[1] / "docs" / "real-machines.md"
@@ -292,18 +293,13 @@ def arm(result: dict) -> list[str]:
         *(f"| {said} | {' | '.join(f'{x:.4f}' for x in result['arm']['position_rmse'][name] or ()) or FLEW} |"
           for name, said in zip(MODELS, ("as given", "inertials refitted", "`corrected.xml`"), strict=True)),
         f"| baseline | {' | '.join(f'{x:.4f}' for x in ARM_BASELINE)} |", "",
-    ]  # fmt: skip
-
-
-def arm_on_another_machine(result: dict) -> list[str]:
-    """How far off the corrected model of the hobby arm is where another processor made the diagnosis."""
-    late = next((n for n in result["arm"]["notes"] if n.startswith("Commands")), "").partition(":")[0]
-    errors = [f"{x:.4f}" for x in result["arm"]["position_rmse"]["corrected"]]
-    return [
-        "This diagnosis depends on the last digits of arithmetic, which differ between processors: while much of the",
-        "sweep is unexplained, they decide which seconds are left out, and those decide how late commands seem. The",
-        f"stored result of another machine, of an engine shortly before: {late[:1].lower() + late[1:]}.",
-        f"There `corrected.xml` errs by {', '.join(errors)} rad.", "",
+        "What happens in the fast end of the sweep shows in accelerations. Up to there joints follow what is asked of",
+        "them, the later the less; then they accelerate no more, whatever is asked. So it would be if the servos limit",
+        "how fast their own goal may accelerate. No effect of the library does that. Amplitudes of the acceleration,",
+        "asked and reached [rad/s²]:", "",
+        f"| part of the sweep [s] | asked | {' | '.join(ARM_JOINTS)} |", f"|---|---|{'---|' * len(ARM_JOINTS)}",
+        *(f"| {part['from']:g} to {part['to']:g} | {np.mean(part['asked']):.0f} | "
+          f"{' | '.join(f'{x:.0f}' for x in part['reached'])} |" for part in result["accelerations"]), "",
     ]  # fmt: skip
 
 
@@ -320,10 +316,7 @@ def main() -> None:
     ]  # fmt: skip
     if (config.results / "real_machines_varied.json").is_file():
         lines += varied(json.loads((config.results / "real_machines_varied.json").read_text(encoding="utf-8")))
-    sections = {
-        "servo_bam_xl330": pendulum, "servo_unitree_go2": legs, "servo_so101": arm,
-        "servo_so101_another_machine": arm_on_another_machine,
-    }  # fmt: skip
+    sections = {"servo_bam_xl330": pendulum, "servo_unitree_go2": legs, "servo_so101": arm}
     for name, section in sections.items():
         if (config.results / f"real_{name}.json").is_file():
             lines += section(read(name))

@@ -39,6 +39,8 @@ from irb140_jax.recordings.machines.unitree_go2 import HELD_OUT, LEGS, PARTS, SW
 from irb140_jax.recordings.servo import taken_up, with_torque
 from irb140_jax.robot import load_robot
 
+ACCELERATING = 8.0  # Hz below which accelerations of the hobby arm are told: twice the fastest of its sweep
+SWEEP_PARTS = ((80.0, 90.0), (100.0, 103.0), (106.0, 108.0), (110.0, 112.0), (114.0, 116.0), (118.0, 119.5))  # s
 CUTOFF, ENDS = 15.0, 0.15  # Hz and s of the baseline's comparison: both sides filtered both ways, ends left out
 # Root mean square over the legs on held-out sweeps, with offsets and a delay [N m].
 BASELINE = {"A": (0.093, 0.058, 0.266), "B": (0.136, 0.092, 0.305)}
@@ -139,7 +141,21 @@ def so101() -> dict[str, Any]:
     whole = told(result) | {"position_rmse": {k: x.tolist() if np.isfinite(x).all() else None for k, x in each.items()}}
     roll = load_robot(so101_model(), ("wrist_roll",))
     stop = told(diagnose(roll, [only(so101_recording("single_joint_wrist_roll"), "wrist_roll")]))
-    return {"motions": list(ARM_MOTIONS), "arm": whole, "blocked_wrist_roll": stop}
+    return {"motions": list(ARM_MOTIONS), "arm": whole, "blocked_wrist_roll": stop,
+            "accelerations": accelerations(so101_recording("chirp_sweep"))}  # fmt: skip
+
+
+def accelerations(run: Recording) -> list[dict[str, Any]]:
+    """How fast commands and joints accelerate in parts of a motion, as amplitudes of sines [rad/s^2]."""
+    step = float(np.median(np.diff(run.t)))
+    sos = signal.butter(4, 2.0 * ACCELERATING * step, output="sos")
+    assert run.qdes is not None
+    asked, went = (np.gradient(np.gradient(signal.sosfiltfilt(sos, x, axis=0), step, axis=0), step, axis=0)
+                   for x in (run.qdes, run.q))  # fmt: skip
+    size = lambda x: (np.sqrt(2.0) * rms(x)).tolist()  # noqa: E731
+    parts = [(run.t > begin) & (run.t < end) for begin, end in SWEEP_PARTS]
+    return [{"from": begin, "to": end, "asked": size(asked[rows]), "reached": size(went[rows])}
+            for (begin, end), rows in zip(SWEEP_PARTS, parts, strict=True)]  # fmt: skip
 
 
 def rms(x: np.ndarray) -> np.ndarray:

@@ -15,8 +15,9 @@ import irb140_jax as irb
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.mismatch import DiagnoseConfig, diagnose
 from irb140_jax.mismatch.motion import fit
-from irb140_jax.mismatch.motion.fit import FREEDOM, MotionFit, _improvement, _information, _student, _weights
-from irb140_jax.mismatch.motion.free import as_estimated, as_predicted
+from irb140_jax.mismatch.motion.fit import FREEDOM, _improvement, _information, _student, _weights
+from irb140_jax.mismatch.motion.free import FreeParameters, as_estimated, as_predicted
+from irb140_jax.mismatch.regression.gaussian import log_odds_of_any, log_odds_of_some
 from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
 from irb140_jax.mismatch.regression.sufficient_data import comparison
 from irb140_jax.mismatch.selection.explain import explain
@@ -27,6 +28,7 @@ sys.path.insert(0, str(ROOT / "experiments"))
 import real_servos
 
 LIBRARY = ("coulomb_friction", "viscous_friction", "rotor_inertia", "torque_offset")
+STATED = stated_drive(np.array(KP), np.array(KD))
 GOAL = 0.0325  # rad, mean absolute error of position on runs that are kept back: see real_bam_xl330.py
 
 
@@ -41,8 +43,7 @@ def _weaker_than_stated(seeds):
     """Logs of two servos of 0.8 times the stated gains, whose joints rub with 0.5 and 0.25 N m."""
     kp, kd = (tuple(0.8 * x for x in gains) for gains in (KP, KD))
     plant = two_links(kp, kd, shoulder='frictionloss="0.5"', elbow='frictionloss="0.25"')
-    stated = stated_drive(np.array(KP), np.array(KD))
-    return [dataclasses.replace(closed_loop(plant, seed)[0], drive=stated) for seed in seeds]
+    return [dataclasses.replace(closed_loop(plant, seed)[0], drive=STATED) for seed in seeds]
 
 
 # --- its parts -------------------------------------------------------------------------------------------------------
@@ -100,10 +101,42 @@ def test_what_masses_say_of_gains_is_in_one_of_the_priors(robot):
         assert (np.abs(off) < 2.0 * width).all() and (width < 0.6 * data.servo.drive.kp_width).all()
 
 
-@pytest.mark.parametrize(("left", "holds"), [((0.2, 0.1), True), ((0.2, 0.0), False)])
-def test_a_fit_that_leaves_nothing_of_an_effect_is_another_explanation(left, holds):
-    found = MotionFit(None, {}, {k: np.array([x]) for k, x in enumerate(left)}, lambda drive: drive, 0.0, {}, {}, 0.1)  # pyright: ignore[reportArgumentType]: not asked for
-    assert found.holds_all_named == holds
+def test_odds_that_parameters_are_not_zero_are_the_ratio_of_prior_and_posterior_density_there():
+    mean, cov, prior = np.array([0.3, -0.5]), np.array([[0.04, 0.01], [0.01, 0.09]]), np.array([1.0, 2.0])
+    # That of a Gaussian at zero but for a constant.
+    density = lambda mean, cov: -0.5 * (mean @ np.linalg.inv(cov) @ mean + np.log(np.linalg.det(cov)))  # noqa: E731
+    ratio = density(np.zeros(2), np.diag(prior**2)) - density(mean, cov)
+    assert abs(log_odds_of_some(mean, cov, prior) - ratio) < 1e-12
+    ratio = stats.norm.logpdf(0.0, 0.0, 2.0) - stats.norm.logpdf(0.0, 1.3, 0.2)
+    assert abs(log_odds_of_any(1.3, 0.2, 2.0) - ratio) < 1e-12
+
+
+def test_effects_of_which_nothing_need_be_left_are_not_needed():
+    """Two are as many standard deviations from zero as is enough for a name, and as is not; one has two amplitudes."""
+    candidates = [types.SimpleNamespace(slug=slug, joints=(0,)) for slug in ("sure", "unsure", "both")]
+    space = types.SimpleNamespace(kinds=types.SimpleNamespace(log_prior=lambda chosen: -3.0 * len(chosen)))
+    ex = types.SimpleNamespace(chosen=(0, 1, 2), others=lambda i: tuple({0, 1, 2} - {i}), space=space,
+                               data=types.SimpleNamespace(candidates=candidates))  # fmt: skip
+    own = [(0, np.array([0]), np.array([20.0])), (1, np.array([1]), np.array([20.0])),
+           (2, np.array([2, 3]), np.array([20.0, 20.0]))]  # fmt: skip
+    free = types.SimpleNamespace(ex=ex, own_amplitudes=lambda: own)
+    found = types.SimpleNamespace(x=np.array([5.0, 3.0, 0.0, 6.0]), precision=np.eye(4))
+    assert fit._unneeded(free, found) == (("unsure", (0,)),)  # pyright: ignore[reportArgumentType]: what it asks of them
+
+
+def test_where_the_torque_lags_commands_and_damping_are_as_unsure(robot):
+    """No simulation holds a lag: in one the same time is lost by commands, or by damping that is less."""
+    rubbing = two_links(shoulder='frictionloss="0.5"', elbow='frictionloss="0.25"', actuators="")
+    logs = [dataclasses.replace(closed_loop(rubbing, seed, lag=0.008)[0], drive=STATED) for seed in (1, 2)]
+    result = diagnose(robot, logs, DiagnoseConfig(effects=(CATALOGUE["coulomb_friction"],)))
+    data = comparison(robot, logs, 0.05, lambda _: None)
+    scatter = np.hypot(*scatter_by_sensor(robot, data.recordings, data.smooth, data.band))
+    ex = explain(robot, data.smooth, data.band, [CATALOGUE["coulomb_friction"]], 0.05, scatter,
+                 later=lambda times: data.later(times).smooth)  # fmt: skip
+    free = FreeParameters.of(ex, result.model, data, (), as_predicted)
+    width = {(w.kind, w.at): unit for w, unit in zip(free.parameters, free.unit, strict=True)}
+    lag = ex.torque_lag()
+    assert lag > 0.006 and width["later", -1] > lag and all(width["kd", j] > lag * KP[j] for j in (0, 1))
 
 
 # --- whole diagnoses -------------------------------------------------------------------------------------------------
@@ -124,6 +157,16 @@ def test_gains_that_are_stated_wrong_and_friction_follow_the_motion(robot, monke
     # A second after a start whose speed it is not told, it is where the robot is.
     apart = real_servos.off(result, runs[2:])["corrected"][0][int(RATE) :]
     assert (np.sqrt(np.mean(apart**2, axis=0)) < 5e-4 * np.ptp(runs[2].q, axis=0)).all()
+
+
+def test_what_the_motion_speaks_against_is_not_named(robot, monkeypatch):
+    """The friction of the elbow is taken to be such: it is not named, and a note says so."""
+    against = ("coulomb_friction", (1,))
+    monkeypatch.setattr(fit, "_unneeded", lambda free, found: (against,))
+    config = DiagnoseConfig(effects=(CATALOGUE["coulomb_friction"],))
+    found = diagnose(robot, _weaker_than_stated((1, 2)), config).diagnosis
+    assert {f.joints for f in found.findings} == {("shoulder",)}
+    assert any(n.startswith("Coulomb friction on elbow would fit the torque") for n in found.notes)
 
 
 def test_a_real_servo_goes_where_its_numbers_in_motion_say(tmp_path: pathlib.Path):

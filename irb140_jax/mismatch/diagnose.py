@@ -154,7 +154,15 @@ def _diagnosed(
         progress("once more, in torque of the Kp that the known payload shows")
         known = by_known_payload(ex, data.servo, recordings, data.recordings)
         return _diagnosed(robot, known, config, progress, whole)
-    data = data.placed(ex.payloads)
+    return _proved(data.placed(ex.payloads), ex, sensors, stops, recordings, config, progress, whole)
+
+
+def _proved(
+    data: Comparison, ex: Explanation, sensors: tuple[np.ndarray, np.ndarray], stops: Sequence[Blocked],
+    recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None], whole: float,
+) -> Result:  # fmt: skip
+    """The result of an explanation, or of another one where the motion of servos speaks against what it names."""
+    robot = data.robot
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
     ex = ex if data.servo else dataclasses.replace(ex, rigid=refit.posterior)
@@ -172,6 +180,10 @@ def _diagnosed(
     if data.servo is not None:
         progress("fitting the model to the motion of the servos")
     stated, fit = data.servo, fitted_in_motion(corrected.data, ex, left, refit.loose, corrected.model)
+    if fit and ex.without_sites and (barred := [site for site in fit.unneeded if site not in ex.unproved]):
+        progress("searching sets of explanations without what the motion speaks against")
+        fewer = without_negligible(ex.without_sites(barred), data.servo)
+        return _proved(data, fewer, sensors, stops, recordings, config, progress, whole)
     found = findings(robot, ex, fit.amplitudes if fit else {})
     data, model, proof, harmful, by_laws = _in_motion(data, ex, corrected, left, fit) if fit else corrected
     bare = data
@@ -292,8 +304,11 @@ def _in_motion(data: Comparison, ex: Explanation, before: Corrected, proof: Held
     stated, drive = data.servo.drive, fit.to_drive(before.model.drive)
     kd = np.divide(drive.kd - stated.kd, stated.kd_width, out=np.zeros_like(drive.kd), where=stated.kd_width > 0.0)
     later = drive.delay - stated.delay - ex.times.delay + fit.later
-    model = dataclasses.replace(fit.model, drive=stated.found(ex.times, later, kd))
-    data = data.later(ex.times, later, kd)
+    # What commands lose in simulations, which hold no lag, is not lost again.
+    lag = min(max(ex.times.lag - fit.later, 0.0), ex.times.lag)
+    times = dataclasses.replace(ex.times, lag=lag)
+    model = dataclasses.replace(fit.model, drive=stated.found(times, later, kd))
+    data = data.later(times, later, kd)
     apart = [data.band.apply(now.tau - r.tau) for now, r in zip(data.smooth, before.data.smooth, strict=True)]
     # What the torque's own numbers leave is not what these leave.
     none = proof.without_discrepancy(np.ones(data.robot.n, dtype=bool))

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg, optimize
 
+from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.corrected.model import CorrectedModel, torques_along
 from irb140_jax.mismatch.corrected.native import beyond_file
 from irb140_jax.mismatch.motion.free import ChangedModel, FreeParameters, as_estimated, as_predicted
@@ -27,8 +28,10 @@ from irb140_jax.mismatch.motion.inputs import Inputs, time_steps
 from irb140_jax.mismatch.motion.laws import without_those
 from irb140_jax.mismatch.motion.models import Simulated, followers, leading, led, positions_of, simulated_corrected
 from irb140_jax.mismatch.motion.windows import Span, Window, windows
+from irb140_jax.mismatch.regression.gaussian import log_odds_of_some
 from irb140_jax.mismatch.regression.noise import correlation_time
 from irb140_jax.mismatch.regression.sufficient_data import Comparison
+from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.recordings.drive import Drive
 
@@ -57,6 +60,7 @@ class MotionFit:
         torque_gains: Real over stated torque of servos, less one, and its standard deviation, by joint.
         rotors: Inertia of rotors that are not named, and its standard deviation, by joint [kg m^2 or kg].
         improvement: Share of the position error on motions that the fit did not see which is gone.
+        unneeded: Effects that are not there with the odds of a name, by torque and motion together.
     """
 
     model: CorrectedModel
@@ -67,11 +71,7 @@ class MotionFit:
     torque_gains: dict[int, tuple[float, float]]
     rotors: dict[int, tuple[float, float]]
     improvement: float
-
-    @property
-    def holds_all_named(self) -> bool:
-        """Whether something is left of every effect that the torque shows: without one it is another explanation."""
-        return all(w.any() for w in self.amplitudes.values())
+    unneeded: tuple[Site, ...]
 
 
 def fit_to_motion(
@@ -89,8 +89,7 @@ def fit_to_motion(
         model: Corrected model of the torque.
 
     Returns:
-        The fit; None where nothing can be simulated, simulations of unseen motions err as much with it, or it leaves
-        nothing of an effect.
+        The fit; None where nothing can be simulated, or simulations of unseen motions err as much with it.
     """
     cut = windows(list(unseen), [r.t for r in data.smooth])
     if not cut:
@@ -109,8 +108,7 @@ def fit_to_motion(
             left_out[fold] = own.model(found.without([w.fold == fold for w in cut], own))
         improvement = _improvement(motions.of_folds(left_out), before)
         if improvement > (best.improvement if best else 0.0):
-            made = _as_found(free, found, left_out, improvement)
-            best = made if made.holds_all_named else best
+            best = _as_found(free, found, left_out, improvement)
     return best
 
 
@@ -125,8 +123,21 @@ def _as_found(
     model, to_drive, later = free.model(found.x)
     return MotionFit(
         model, {k: made for k, (made, _, _) in left_out.items()}, free.amplitudes(own), to_drive, later,
-        of_kind("torque_gain"), of_kind("rotor"), improvement,
+        of_kind("torque_gain"), of_kind("rotor"), improvement, _unneeded(free, found),
     )  # fmt: skip
+
+
+def _unneeded(free: FreeParameters, found: "_Found") -> tuple[Site, ...]:
+    """Effects whose own amplitudes may be zero, at the odds at which they would not be named."""
+    ex, cov, out = free.ex, linalg.inv(found.precision), []
+    for index, rows, width in free.own_amplitudes():
+        mean, kinds = found.x[rows], ex.space.kinds
+        prior = np.maximum(width, np.abs(mean))  # a strong effect's is as wide as it is large
+        log_odds = log_odds_of_some(mean, cov[np.ix_(rows, rows)], prior)
+        log_odds += kinds.log_prior(ex.chosen) - kinds.log_prior(ex.others(index))
+        if log_odds < np.log(settings.NAMED / (1.0 - settings.NAMED)):
+            out.append(site_of(ex.data.candidates[index]))
+    return tuple(out)
 
 
 class _Found(NamedTuple):

@@ -143,11 +143,15 @@ class FreeParameters:
                 laws += [(FreeParameter(kind, at, k), part.start + k, *ends) for k, ends in bounds]
             at += 1
         (gain,) = TORQUE_GAIN.law.parameters
-        for j, (of_kp, of_kd) in enumerate(zip(prior.gains[:, 1].tolist(), prior.kd[:, 1].tolist(), strict=True)):
+        # No simulation holds a lag of the torque: in one the same time is lost by a later command and less damping.
+        lag = ex.torque_lag()
+        damping = np.where(prior.kd[:, 1] > 0.0, np.hypot(prior.kd[:, 1], np.nan_to_num(drive.kp) * lag), 0.0)
+        for j, (of_kp, of_kd) in enumerate(zip(prior.gains[:, 1].tolist(), damping.tolist(), strict=True)):
             widths += [(FreeParameter("torque_gain", j), of_kp, gain.low - 1.0, gain.high - 1.0)]
             widths += [(FreeParameter("kd", j), of_kd, -float(drive.kd[j]), np.inf)]
         if drive.common_delay_width:
-            widths += [(FreeParameter("later", -1), ex.command_delay(drive)[1], -float(np.min(drive.delay)), np.inf)]
+            unsure = float(np.hypot(ex.command_delay(drive)[1], lag))
+            widths += [(FreeParameter("later", -1), unsure, -float(np.min(drive.delay)), np.inf)]
         widths = [x for x in widths if x[1] > 0.0]
         scale = ex.data.scale[post.columns]
         laws = [x for x in laws if scale[x[1]] > 0.0]  # others move nothing
@@ -206,6 +210,22 @@ class FreeParameters:
     def _later(self, own: np.ndarray) -> float:
         """By how much later commands act [s]."""
         return float(sum(value for what, value in zip(self.parameters, own, strict=True) if what.kind == "later"))
+
+    def own_amplitudes(self) -> list[tuple[int, np.ndarray, np.ndarray]]:
+        """Of each named effect its candidate, which parameters are its own amplitudes, and their prior widths.
+
+        Own are those without which it would be a special case of itself.  Widths are before any torque, in `unit`s.
+        """
+        index, out = [i for i in self.ex.chosen if not self.ex.data.candidates[i].is_inertials], []
+        for at, i in enumerate(index):
+            c = self.ex.data.candidates[i]
+            scale = self.ex.data.scale[self.ex.data.nuisances + c.columns]
+            own = np.isin(c.variant, [k % c.effect.law.width for k in c.effect.law.own])
+            rows = [k for k, w in enumerate(self.parameters) if w.kind == "law" and w.at == at and own[w.column]]
+            if rows:
+                columns = [self.parameters[k].column for k in rows]
+                out.append((i, np.array(rows), scale[columns] / self.unit[rows]))
+        return out
 
     def amplitudes(self, own: np.ndarray) -> dict[int, np.ndarray]:
         """Of each named candidate that they change, by its number."""

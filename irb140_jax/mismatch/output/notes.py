@@ -131,13 +131,13 @@ def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
 
 
 def unproved_notes(ex: Explanation) -> list[str]:
-    """A note for every effect that the search found and unseen motions speak against."""
+    """A note for every effect that the search found and motions speak against."""
     names, out = ex.lib.robot.joint_names, []
     for slug, joints in ex.unproved:
         title = ex.lib.effects[slug].title
         out.append(
-            f"{title[0].upper()}{title[1:]} on {', '.join(names[j] for j in joints)} would fit these recordings, but "
-            "motions that the fit did not see speak against it: it is not named."
+            f"{title[0].upper()}{title[1:]} on {', '.join(names[j] for j in joints)} would fit the torque of these "
+            "recordings, but motions that the fit did not see, or simulated ones, speak against it: it is not named."
         )
     return out
 

@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
-from scipy import linalg, stats
+from scipy import linalg
 
 from irb140_jax.mismatch.columns.candidates import Candidate
 from irb140_jax.mismatch.regression.noise import Noise
@@ -168,4 +168,18 @@ def gain_of(H: np.ndarray, columns: np.ndarray) -> float:
 
 def log_odds_of_any(mean: float, std: float, prior: float) -> float:
     """Log odds that a parameter is not zero, from its posterior and the width of its prior (Savage and Dickey)."""
-    return float(stats.norm.logpdf(0.0, 0.0, prior) - stats.norm.logpdf(0.0, mean, std))
+    return float(0.5 * (mean / std) ** 2 + np.log(std / prior))
+
+
+def log_odds_of_some(mean: np.ndarray, cov: np.ndarray, prior: np.ndarray) -> float:
+    """Log odds that parameters are not all zero.
+
+    Args:
+        mean, cov: Of the posterior, shape (k,) and (k, k).
+        prior: Standard deviations before, of mean zero, shape (k,).
+
+    Source: Dickey, The weighted likelihood ratio, Annals of Mathematical Statistics 42(1), 1971.
+    """
+    root_ = linalg.cholesky(cov, lower=True)
+    away = linalg.solve_triangular(root_, mean, lower=True)
+    return float(0.5 * away @ away + np.log(np.diag(root_)).sum() - np.log(prior).sum())

@@ -80,15 +80,24 @@ def explain(
     first = with_proposals(library(robot, effects, scales), along, band, factor, uncertainty, scales)
     drive = recordings[0].servo and recordings[0].servo.drive
     given = _Given(first, scales, band, factor, uncertainty, sensors, progress, later, drive)
-    start = _Start(1, first, along, [None] * len(along))
+    return _settled(given, _Start(1, first, along, [None] * len(along)), unproved)
+
+
+def _settled(
+    given: "_Given", start: "_Start", unproved: Callable[[Explanation], Sequence[Site]], sites: Sequence[Site] = ()
+) -> Explanation:
+    """What the rounds come to from where they start, without some effects."""
+    start = start.without(sites)
     while True:
         ex, last = _explained(given, start)
         if not last:
             start = _next(given, start, ex)
         elif barred := unproved(ex):
             start = start.without(barred)
-        else:
+        elif given.drive is None:
             return ex
+        else:
+            return dataclasses.replace(ex, without_sites=partial(_settled, given, start, unproved))
         del ex  # hundreds of megabytes, before the next
 
 
@@ -233,7 +242,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     data, space = regression.data, regression.space
     search = partial(selected, regression.allowed, regression.chosen, every_move=start.whole)
     best, hyper, visited = search()
-    falling = partial(with_falling_friction, space, data, regression.extra[0], given.scales)
+    falling = partial(with_falling_friction, regression.allowed, data, regression.extra[0], given.scales)
     shifting = partial(with_late_channels, regression.allowed, held=at.rests_on if at else frozenset())
     found, found_hyper, late = shifting(best, hyper)
     # Slopes at an explanation say nothing of one without what it rests on: under leaning gravity that nothing is named

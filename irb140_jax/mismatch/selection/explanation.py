@@ -46,7 +46,7 @@ class Explanation:
         scaled: Whether it is a finding, and as such in what predicts.
         factor: Square root of the inertial prior at relative standard deviation 1, shape (10 n, 10 n).
         falls: Members that are named because friction certainly falls with speed, whatever its form.
-        unproved: What the search found and unseen motions speak against: not named.
+        unproved: What the search found and unseen or simulated motions speak against: not named.
         times: When drives act, by which torques of its rows were made.
         payloads: What the tool carried in each recording, by which its rows were made.
         rigid: The fit of the inertials alone, from all blocks of the data or all but some: it predicts where nothing is
@@ -56,6 +56,7 @@ class Explanation:
             sets without them is wrong.
         nominal: The explanation by slopes at the nominal model, without its rows, where there are such effects.
         late: Members that are named because their channel is certainly early or late.
+        without_sites: The last round of the search again, without some effects: of logs of commands alone.
     """
 
     lib: Library
@@ -81,6 +82,7 @@ class Explanation:
     rests_on: frozenset[Site] = frozenset()
     nominal: "Explanation | None" = None
     late: Mapping[Site, Late] = dataclasses.field(default_factory=dict)
+    without_sites: Callable[[Sequence[Site]], "Explanation"] | None = None
 
     @property
     def members(self) -> list[Candidate]:
