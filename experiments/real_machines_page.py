@@ -293,10 +293,10 @@ def arm(result: dict) -> list[str]:
         *(f"| {said} | {' | '.join(f'{x:.4f}' for x in result['arm']['position_rmse'][name] or ()) or FLEW} |"
           for name, said in zip(MODELS, ("as given", "inertials refitted", "`corrected.xml`"), strict=True)),
         f"| baseline | {' | '.join(f'{x:.4f}' for x in ARM_BASELINE)} |", "",
-        "What happens in the fast end of the sweep shows in accelerations. Up to there joints follow what is asked of",
-        "them, the later the less; then they accelerate no more, whatever is asked. So it would be if the servos limit",
-        "how fast their own goal may accelerate. No effect of the library does that. Amplitudes of the acceleration,",
-        "asked and reached [rad/s²]:", "",
+        "What happens in the fast end of the sweep shows in accelerations. First the joints reach most of what is",
+        "asked of them; then they accelerate no more, whatever is asked. So it would be if each servo limited the",
+        "acceleration of its own goal. No effect of the library does that. Amplitudes of the acceleration, asked and",
+        "reached [rad/s²]:", "",
         f"| part of the sweep [s] | asked | {' | '.join(ARM_JOINTS)} |", f"|---|---|{'---|' * len(ARM_JOINTS)}",
         *(f"| {part['from']:g} to {part['to']:g} | {np.mean(part['asked']):.0f} | "
           f"{' | '.join(f'{x:.0f}' for x in part['reached'])} |" for part in result["accelerations"]), "",

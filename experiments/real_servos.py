@@ -39,7 +39,7 @@ from irb140_jax.recordings.machines.unitree_go2 import HELD_OUT, LEGS, PARTS, SW
 from irb140_jax.recordings.servo import taken_up, with_torque
 from irb140_jax.robot import load_robot
 
-ACCELERATING = 8.0  # Hz below which accelerations of the hobby arm are told: twice the fastest of its sweep
+ACCELERATING = 8.0  # Hz, the low-pass of accelerations of the hobby arm: twice the fastest of its sweep
 SWEEP_PARTS = ((80.0, 90.0), (100.0, 103.0), (106.0, 108.0), (110.0, 112.0), (114.0, 116.0), (118.0, 119.5))  # s
 CUTOFF, ENDS = 15.0, 0.15  # Hz and s of the baseline's comparison: both sides filtered both ways, ends left out
 # Root mean square over the legs on held-out sweeps, with offsets and a delay [N m].
@@ -146,7 +146,7 @@ def so101() -> dict[str, Any]:
 
 
 def accelerations(run: Recording) -> list[dict[str, Any]]:
-    """How fast commands and joints accelerate in parts of a motion, as amplitudes of sines [rad/s^2]."""
+    """Amplitude of the acceleration of each joint in parts of a motion, as commanded and as reached [rad/s^2]."""
     step = float(np.median(np.diff(run.t)))
     sos = signal.butter(4, 2.0 * ACCELERATING * step, output="sos")
     assert run.qdes is not None

@@ -112,7 +112,7 @@ def test_odds_that_parameters_are_not_zero_are_the_ratio_of_prior_and_posterior_
 
 
 def test_effects_of_which_nothing_need_be_left_are_not_needed():
-    """Two are as many standard deviations from zero as is enough for a name, and as is not; one has two amplitudes."""
+    """One is five standard deviations from zero, one is three, and one has two amplitudes of which one is six."""
     candidates = [types.SimpleNamespace(slug=slug, joints=(0,)) for slug in ("sure", "unsure", "both")]
     space = types.SimpleNamespace(kinds=types.SimpleNamespace(log_prior=lambda chosen: -3.0 * len(chosen)))
     ex = types.SimpleNamespace(chosen=(0, 1, 2), others=lambda i: tuple({0, 1, 2} - {i}), space=space,

@@ -36,7 +36,7 @@ EFFECT = Effect(
         columns=_columns,
         to_log=lambda x, dt, w, shape: w[0] * np.gradient(x, dt, axis=0),
     ),
-    place=Place(At.LOG_TIMING, of_channel=True),
+    place=Place(At.LOG_TIMING),
     prior=Prior(lowest=(0.0,)),
     export=Export(
         not_in_mjcf="it is left out: MuJoCo can filter an actuator (dyntype), but then the torque depends on the past",

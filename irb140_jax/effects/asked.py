@@ -11,7 +11,7 @@ from irb140_jax.effects.motion import Asked, Motion, of_site
 from irb140_jax.effects.records import At, Place, Prior
 from irb140_jax.types import Samples
 
-PLACE = Place(At.ASKED, of_servos=True)
+PLACE = Place(At.ASKED)
 # Their torque is all of what their shape says; a fifth more or less is another law.
 PRIOR = Prior(lowest=(0.8,), highest=(1.25,))
 

@@ -34,7 +34,7 @@ EFFECT = Effect(
     },
     where=_where,
     law=law("tau(t + delay) - tau(t) on one joint", _columns),
-    place=Place(At.LOG_TIMING, _sites, of_channel=True),
+    place=Place(At.LOG_TIMING, _sites),
     prior=PRIOR,
     shapes=SHAPES,
     export=EXPORT,

@@ -127,19 +127,23 @@ class Place:
         at: Where on the way from the motor to the log.
         sites: Groups of joints at which it can act, (sites, m).
         everywhere: Its columns fill the rows of all joints, not only of those it is named after.
-        of_channel: It is an error of the torque channel, of its scale or clock; torque made of commands has none.
-        of_servos: It is a law of position servos: of logs of commands alone.
     """
 
     at: At = At.LINKS
     sites: Callable[[Robot], np.ndarray] = each_joint
     everywhere: bool = False
-    of_channel: bool = False
-    of_servos: bool = False
 
     def is_in(self, *, servo: bool) -> bool:
-        """Whether there can be such an effect in logs of commands, or in logs of torque."""
-        return not (self.of_channel if servo else self.of_servos)
+        """Whether there can be such an effect in logs of commands, or in logs of torque.
+
+        Torque made of commands has no scale and no clock of its own.
+        """
+        return not (self.at.of_any_torque if servo else self.of_servos)
+
+    @property
+    def of_servos(self) -> bool:
+        """Whether it is a law of position servos."""
+        return self.at is At.ASKED
 
     @property
     def is_friction(self) -> bool:

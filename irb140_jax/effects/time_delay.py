@@ -20,7 +20,7 @@ EFFECT = Effect(
     },
     where="positions are logged {delay:ms} after the torque they belong to",
     law=law("tau(t + delay) - tau(t) on every joint", _columns),
-    place=Place(At.LOG_TIMING, all_joints, everywhere=True, of_channel=True),
+    place=Place(At.LOG_TIMING, all_joints, everywhere=True),
     prior=PRIOR,
     shapes=SHAPES,
     export=EXPORT,

@@ -39,7 +39,7 @@ EFFECT = Effect(
         from_physical=lambda values: (np.array([1.0 / values["gain"] - 1.0]), np.zeros(0)),
         to_log=lambda x, dt, w, shape: w[0] * x,
     ),
-    place=Place(At.LOG_SCALE, _sites, of_channel=True),
+    place=Place(At.LOG_SCALE, _sites),
     # Typical is what torque constants are known to.
     prior=Prior(typical=0.1, tied=True, lowest=(1.0 / LARGEST - 1.0,), highest=(LARGEST - 1.0,)),
     export=Export(

@@ -305,8 +305,8 @@ def _in_motion(data: Comparison, ex: Explanation, before: Corrected, proof: Held
     kd = np.divide(drive.kd - stated.kd, stated.kd_width, out=np.zeros_like(drive.kd), where=stated.kd_width > 0.0)
     later = drive.delay - stated.delay - ex.times.delay + fit.later
     # What commands lose in simulations, which hold no lag, is not lost again.
-    lag = min(max(ex.times.lag - fit.later, 0.0), ex.times.lag)
-    times = dataclasses.replace(ex.times, lag=lag)
+    lag = np.clip(ex.times.lag - fit.later, 0.0, ex.times.lag)
+    times = dataclasses.replace(ex.times, lag=float(lag))
     model = dataclasses.replace(fit.model, drive=stated.found(times, later, kd))
     data = data.later(times, later, kd)
     apart = [data.band.apply(now.tau - r.tau) for now, r in zip(data.smooth, before.data.smooth, strict=True)]

@@ -241,7 +241,8 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
         *harmful_notes(robot, of.harmful), *open_joints,
         *rest_notes(robot, of.proof, scatter), *slight_notes(robot, of.slight),
         *left_notes(robot, of.proof, scatter, torque, told),
-        *unproved_notes(of.ex), *inertial_notes(of.ex, of.uncertainty), *friction_notes(of.ex, of.data.names, judged),
+        *unproved_notes(of.ex, servo=of.servo is not None), *inertial_notes(of.ex, of.uncertainty),
+        *friction_notes(of.ex, of.data.names, judged),
         *channels, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,
         *notes(of.data, of.uncertainty, judged), *gap_notes(robot, gap, torque, lacking),
     ]  # fmt: skip

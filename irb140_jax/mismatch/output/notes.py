@@ -130,14 +130,15 @@ def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
     ]
 
 
-def unproved_notes(ex: Explanation) -> list[str]:
-    """A note for every effect that the search found and motions speak against."""
+def unproved_notes(ex: Explanation, *, servo: bool) -> list[str]:
+    """A note for every effect that the search found and motions, of servos simulated ones too, speak against."""
     names, out = ex.lib.robot.joint_names, []
+    simulated = ", or simulations from the commands," if servo else ""
     for slug, joints in ex.unproved:
         title = ex.lib.effects[slug].title
         out.append(
             f"{title[0].upper()}{title[1:]} on {', '.join(names[j] for j in joints)} would fit the torque of these "
-            "recordings, but motions that the fit did not see, or simulated ones, speak against it: it is not named."
+            f"recordings, but motions that the fit did not see{simulated} speak against it: it is not named."
         )
     return out
 

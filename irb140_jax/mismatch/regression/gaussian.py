@@ -180,6 +180,6 @@ def log_odds_of_some(mean: np.ndarray, cov: np.ndarray, prior: np.ndarray) -> fl
 
     Source: Dickey, The weighted likelihood ratio, Annals of Mathematical Statistics 42(1), 1971.
     """
-    root_ = linalg.cholesky(cov, lower=True)
-    away = linalg.solve_triangular(root_, mean, lower=True)
-    return float(0.5 * away @ away + np.log(np.diag(root_)).sum() - np.log(prior).sum())
+    L = linalg.cholesky(cov, lower=True)
+    away = linalg.solve_triangular(L, mean, lower=True)
+    return float(0.5 * away @ away + np.log(np.diag(L)).sum() - np.log(prior).sum())
