@@ -21,6 +21,7 @@ from irb140_jax.mismatch.regression.nuisances import nuisances
 from irb140_jax.mismatch.regression.rows import bare_stretch, candidate_rows, stretch
 from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import point
+from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.recordings.condition import condition
 
 ALONG = prepared(ROBOT, SMOOTH)
@@ -103,10 +104,11 @@ def test_rows_are_the_same_in_windows_of_any_length(laws, monkeypatch):
         np.testing.assert_allclose(other, one, atol=1e-6 * np.abs(one).max())
 
 
-def the_grams():
-    """Gram matrices of all candidates, and of a small library's columns by block."""
+def the_grams(told=True):
+    """Rows of the joints that are told of, and Gram matrices of all candidates."""
     noise = Noise(np.tile([1.0, -0.4, *np.zeros(ORDER - 1)], (N, 1)), np.ones((1, N)), np.ones((1, N)), np.ones(N))
     bare = judged([bare_stretch(LIB, ALONG, 0, BAND, FACTOR)])
+    bare = [dataclasses.replace(s, use=s.use & told) for s in bare]
     extra = nuisances(ROBOT, [ALONG], [(ALONG.nominal, ALONG.nominal)], BAND, SCALES)
     sums = summed(LIB, bare, [partial(candidate_rows, LIB, ALONG, 0, BAND, None, None)], extra, noise)
     data = Data(bare, prior_scale(LIB, bare, 0.05, sums.power), with_loose_inertials(LIB), 10 * N)
@@ -123,6 +125,16 @@ def test_sums_over_windows_are_the_sums_over_all_rows(monkeypatch):
         size = np.maximum(np.sqrt(np.diagonal(one.blocks[0])), 1e-30)  # some columns are nothing
         square = np.outer(size, size)
         np.testing.assert_allclose(other.blocks[0] / square, one.blocks[0] / square, atol=1e-6)
+
+
+def test_nothing_is_in_a_set_of_which_no_row_tells():
+    data, extra, _, joints = the_grams(np.arange(N) > 0)
+    space = space_of(joints, data, extra[0].common.shape[-1], LIB, LIB)
+    assert any(c.joints == (0,) and c.lowest[0] < 0.0 for c in data.candidates)  # of some, a part may be taken away
+    for i, c in enumerate(data.candidates):
+        untold = c.joints == (0,) and not (c.effect.place.everywhere or c.is_inertials)
+        assert space.outside(np.array([i]), np.zeros((1, len(c.columns))))[0] or not untold
+        assert c.joints != (1,) or not c.effect.prior.ordinary or np.isfinite(space.lowest[i, 0])
 
 
 def test_blocks_of_the_columns_that_are_held_add_up_to_the_same():

@@ -38,9 +38,12 @@ class LeftOver:
 
     @cached_property
     def _half(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cholesky factor L of the known columns' posterior precision, and L^-1 known' y."""
+        """Triangular factor L of the known columns' posterior precision L L', and L^-1 known' y.
+
+        By an orthogonal decomposition: where columns are equal to many digits, their products are no longer positive.
+        """
         B = self.known.reshape(-1, self.known.shape[-1])
-        half = linalg.cholesky(B.T @ B + np.eye(B.shape[1]), lower=True)
+        half = np.linalg.qr(np.concatenate([B, np.eye(B.shape[1])]), mode="r").T
         return half, linalg.solve_triangular(half, B.T @ self.y.ravel(), lower=True)
 
     @cached_property

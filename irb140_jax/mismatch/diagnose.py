@@ -80,6 +80,29 @@ class DiagnoseConfig:
         return {"inertial_uncertainty": self.inertial_uncertainty, "effects": effects}
 
 
+@dataclasses.dataclass(frozen=True)
+class _Task:
+    """What is to be diagnosed.
+
+    Attributes:
+        robot: The nominal model.
+        recordings: Of this robot.
+        config: Options.
+        progress: Told what is being done, a few words at a time.
+        whole: How long all was recorded [s], where some time is left out already.
+    """
+
+    robot: Robot
+    recordings: Sequence[Recording]
+    config: DiagnoseConfig
+    progress: Callable[[str], None]
+    whole: float = 0.0
+
+    def of(self, recordings: Sequence[Recording], recorded: float) -> "_Task":
+        """The same of other rows, where so much had been recorded [s]."""
+        return dataclasses.replace(self, recordings=recordings, whole=max(self.whole, recorded))
+
+
 class Corrected(NamedTuple):
     """A corrected model and how it fares.
 
@@ -121,7 +144,7 @@ def diagnose(
     make_room_for_programs()  # hundreds of robots in one process would crash it
     # Thousands of small solves: a second BLAS thread costs more in waking up than it does.
     with threadpool_limits(1, "blas"):
-        return _diagnosed(robot, recordings, config or DiagnoseConfig(), _giving_back(progress))
+        return _diagnosed(_Task(robot, recordings, config or DiagnoseConfig(), _giving_back(progress)))
 
 
 def _giving_back(progress: Callable[[str], None]) -> Callable[[str], None]:
@@ -134,35 +157,33 @@ def _giving_back(progress: Callable[[str], None]) -> Callable[[str], None]:
     return told
 
 
-def _diagnosed(
-    robot: Robot, recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None],
-    whole: float = 0.0,
-) -> Result:  # fmt: skip
-    """See `diagnose`; `whole` is how long all was recorded [s], where some time is left out already."""
-    data = comparison(robot, recordings, config.inertial_uncertainty, progress)
+def _diagnosed(task: _Task) -> Result:
+    """See `diagnose`."""
+    robot, progress = task.robot, task.progress
+    data = comparison(robot, task.recordings, task.config.inertial_uncertainty, progress)
     if reason := too_little(data.smooth, data.band):
-        return _nothing_compared(data, config, reason)
+        return _nothing_compared(data, task.config, reason)
     stops = blocked(robot, data.smooth)
-    if stops and (others := _other_times(stops, data, recordings, whole)):
+    if stops and (others := _other_times(stops, data, task)):
         progress("once more, without the times at which something stops a joint")
-        result = _diagnosed(robot, others, config, progress, max(whole, data.seconds))
+        result = _diagnosed(task.of(others, data.seconds))
         if result.diagnosis.verdict != "undecided":
-            return _of_all(data, config, result, with_joints_blocked(result.diagnosis, stops, robot, left_out=True))
+            blocks = with_joints_blocked(result.diagnosis, stops, robot, left_out=True)
+            return _of_all(data, task.config, result, blocks)
     sensors = scatter_by_sensor(robot, data.recordings, data.smooth, data.band)
-    ex = _explained(data, sensors, config, progress)
+    ex = _explained(data, sensors, task)
     if data.servo is not None and any(ex.payloads) and PAYLOAD not in data.servo.drive.said:
         progress("once more, in torque of the Kp that the known payload shows")
-        known = by_known_payload(ex, data.servo, recordings, data.recordings)
-        return _diagnosed(robot, known, config, progress, whole)
-    return _proved(data.placed(ex.payloads), ex, sensors, stops, recordings, config, progress, whole)
+        known = by_known_payload(ex, data.servo, task.recordings, data.recordings)
+        return _diagnosed(dataclasses.replace(task, recordings=known))
+    return _proved(data.placed(ex.payloads), ex, sensors, stops, task)
 
 
 def _proved(
-    data: Comparison, ex: Explanation, sensors: tuple[np.ndarray, np.ndarray], stops: Sequence[Blocked],
-    recordings: Sequence[Recording], config: DiagnoseConfig, progress: Callable[[str], None], whole: float,
-) -> Result:  # fmt: skip
+    data: Comparison, ex: Explanation, sensors: tuple[np.ndarray, np.ndarray], stops: Sequence[Blocked], task: _Task
+) -> Result:
     """The result of an explanation, or of another one where the motion of servos speaks against what it names."""
-    robot = data.robot
+    robot, config, progress = task.robot, task.config, task.progress
     progress("proving on data that the fit did not see")
     refit = refitted(ex)
     ex = ex if data.servo else dataclasses.replace(ex, rigid=refit.posterior)
@@ -175,7 +196,7 @@ def _proved(
         corrected = _corrected(data, ex, refit, left, config)
     progress("looking for structure that no effect explains")
     rest, slight = unexplained(ex, left, np.hypot(*sensors))
-    if (result := _without_unexplained_time(data, ex, left, rest, recordings, config, progress, whole)) is not None:
+    if (result := _without_unexplained_time(data, ex, left, rest, task)) is not None:
         return result
     if data.servo is not None:
         progress("fitting the model to the motion of the servos")
@@ -183,7 +204,7 @@ def _proved(
     if fit and ex.without_sites and (barred := [site for site in fit.unneeded if site not in ex.unproved]):
         progress("searching sets of explanations without what the motion speaks against")
         fewer = without_negligible(ex.without_sites(barred), data.servo)
-        return _proved(data, fewer, sensors, stops, recordings, config, progress, whole)
+        return _proved(data, fewer, sensors, stops, task)
     found = findings(robot, ex, fit.amplitudes if fit else {})
     data, model, proof, harmful, by_laws = _in_motion(data, ex, corrected, left, fit) if fit else corrected
     bare = data
@@ -203,13 +224,11 @@ def _proved(
     return Result(diagnosis, model, report_views(of, diagnosis.notes, motion), open_)
 
 
-def _other_times(
-    stops: Sequence[Blocked], data: Comparison, recordings: Sequence[Recording], whole: float
-) -> list[Recording] | None:
+def _other_times(stops: Sequence[Blocked], data: Comparison, task: _Task) -> list[Recording] | None:
     """The recordings without the times at which something stops a joint; None where less than half of all stays."""
     times = [(data.names[i], begin, end) for s in stops for i, begin, end in s.times]
     kept = data.seconds - sum(end - begin for _, begin, end in times)
-    return without(recordings, times) if 2.0 * kept > max(whole, data.seconds) else None
+    return without(task.recordings, times) if 2.0 * kept > max(task.whole, data.seconds) else None
 
 
 def _of_all(data: Comparison, config: DiagnoseConfig, result: Result, diagnosis: Diagnosis) -> Result:
@@ -221,25 +240,24 @@ def _of_all(data: Comparison, config: DiagnoseConfig, result: Result, diagnosis:
 
 
 def _without_unexplained_time(
-    data: Comparison, ex: Explanation, proof: HeldOut, rest: Sequence[Structure], recordings: Sequence[Recording],
-    config: DiagnoseConfig, progress: Callable[[str], None], whole: float,
-) -> Result | None:  # fmt: skip
+    data: Comparison, ex: Explanation, proof: HeldOut, rest: Sequence[Structure], task: _Task
+) -> Result | None:
     """The result of all but a short time in which nothing explains most joints; None where there is no such time.
 
     At least half of all that was recorded stays.
     """
-    recorded = data.seconds
-    whole, when = max(whole, recorded), common_time(rest, int(proof.judged.sum()), recorded)
-    if when is None or 2.0 * (recorded - (when.end - when.begin)) < whole:
+    when = common_time(rest, int(proof.judged.sum()), data.seconds)
+    if when is None or 2.0 * (data.seconds - (when.end - when.begin)) < max(task.whole, data.seconds):
         return None
-    if (others := without(recordings, [(data.names[when.recording], when.begin, when.end)])) is None:
+    others = without(task.recordings, [(data.names[when.recording], when.begin, when.end)])
+    if others is None:
         return None
     said = f"from {when.begin:.4g} to {when.end:.4g} s of {data.names[when.recording]}"
-    progress(f"once more, without what nothing explains {said}")
-    result = _diagnosed(data.robot, others, config, progress, whole)
+    task.progress(f"once more, without what nothing explains {said}")
+    result = _diagnosed(task.of(others, data.seconds))
     if result.diagnosis.verdict == "undecided":
         return None
-    return _of_all(data, config, result, with_time_left_out(result.diagnosis, said, rest, data))
+    return _of_all(data, task.config, result, with_time_left_out(result.diagnosis, said, rest, data))
 
 
 def _nothing_compared(data: Comparison, config: DiagnoseConfig, reason: str) -> Result:
@@ -262,14 +280,12 @@ def _searched(config: DiagnoseConfig, data: Comparison) -> tuple[Effect, ...]:
     return tuple(e for e in there if known or not e.place.of_servos)
 
 
-def _explained(
-    data: Comparison, sensors: tuple[np.ndarray, np.ndarray], config: DiagnoseConfig, progress: Callable[[str], None]
-) -> Explanation:
+def _explained(data: Comparison, sensors: tuple[np.ndarray, np.ndarray], task: _Task) -> Explanation:
     """What the model leaves out, with one scale of all torques where that is probable."""
-    scatter, uncertainty = np.hypot(*sensors), config.inertial_uncertainty
+    scatter, uncertainty = np.hypot(*sensors), task.config.inertial_uncertainty
     later = lambda times: data.later(times).smooth  # noqa: E731
-    effects = _searched(config, data)
-    ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, progress, unproved, later)
+    effects = _searched(task.config, data)
+    ex = explain(data.robot, data.smooth, data.band, effects, uncertainty, scatter, task.progress, unproved, later)
     return without_negligible(ex, data.servo)
 
 

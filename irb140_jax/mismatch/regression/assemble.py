@@ -57,7 +57,8 @@ def prior_scale(lib: Library, stretches: list[Stretch], uncertainty: float, powe
     torque = np.sqrt(sum(np.sum(s.tau**2, axis=0) for s in stretches) / rows)
     joints, amplitudes = lib.entries
     rms, typical = np.sqrt(power / rows), np.full(lib.size, np.inf)
-    seen = rms > ROUNDING * torque[joints]
+    tells = np.any([s.use.any(axis=0) for s in judged(stretches)], axis=0)
+    seen = (rms > ROUNDING * torque[joints]) & tells[joints]
     np.minimum.at(typical, amplitudes[seen], torque[joints[seen]] / rms[seen])
     typical[~np.isfinite(typical)] = 0.0
     for effect, sites, shapes, first in lib.blocks:

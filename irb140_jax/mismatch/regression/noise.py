@@ -79,24 +79,20 @@ def noise_from_residuals(
     ar, alike = np.zeros((n, ORDER + 1)), np.ones(n)
     level, total = np.zeros((len(residuals), n)), np.zeros((len(residuals), n))
     for j in range(n):
-        scale = [_size(r[u[:, j], j], b[u[:, j], j]) for r, u, b in zip(residuals, use, unsure, strict=True)]
+        counts = np.array([int(u[:, j].sum()) for u in use])
+        sizes = [_size(r[u[:, j], j], b[u[:, j], j]) for r, u, b in zip(residuals, use, unsure, strict=True)]
+        scale = _beside_others(np.array(sizes), counts)
         # Each recording counts by its shape, not by its size: the loudest must not decide the colour.
         acov, counted = np.zeros((2, ORDER + 1)), []
         for r, u, b, s in zip(residuals, use, unsure, scale, strict=True):
-            if s > 0:
+            if u[:, j].any():
                 counted.append(np.where(u[:, j], r[:, j] / (s * spread(b[:, j], s)), 0.0))
                 acov += _autocovariance(counted[-1], u[:, j])
         alike[j] = correlation_time(counted)
         ar[j], innovation = _whitener(_per_pair(*acov))
-        rows = sum(int(u[:, j].sum()) for u in use)
-        inflate = np.sqrt(rows / max(rows - dof[j], 0.2 * rows, 1.0))
-        for r in range(len(residuals)):
-            level[r, j] = inflate * scale[r] * innovation
-            total[r, j] = inflate * scale[r]
-    # A recording in which a joint never moves has no noise of its own: it takes the middling one.
-    for x in (level, total):
-        median = np.array([np.median(c[c > 0]) if np.any(c > 0) else 1.0 for c in x.T])
-        np.copyto(x, median, where=x <= 0)
+        rows = int(counts.sum())
+        total[:, j] = np.sqrt(max(rows, 1) / max(rows - dof[j], 0.2 * rows, 1.0)) * scale
+        level[:, j] = total[:, j] * innovation
     return Noise(ar, np.maximum(level, 1e-9), np.maximum(total, 1e-9), alike)
 
 
@@ -151,6 +147,18 @@ def _size(residual: np.ndarray, unsure: np.ndarray) -> float:
     for _ in range(ROUNDS if whole > 0.0 else 0):
         size = max(float(np.sqrt(np.mean((residual / spread(unsure, size)) ** 2))), settings.LEAST_NOISE * whole)
     return size
+
+
+def _beside_others(sizes: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Noise of each recording, (recordings,), where one more row shows the middling one; 1 where none has any.
+
+    Of few rows nearly any law leaves nothing, which is no measure of noise; without rows it is the middling one.
+
+    Source: Kass and Wasserman, JASA 90 (1995): a prior that is worth one observation.
+    """
+    known = sizes > 0.0
+    usual = float(np.median(sizes[known])) if known.any() else 1.0
+    return np.sqrt((usual**2 + rows * sizes**2) / (1.0 + rows))
 
 
 def _autocovariance(x: np.ndarray, use: np.ndarray) -> np.ndarray:

@@ -267,8 +267,9 @@ class Space:
         return float(sum(self.log_prior[c] for c in chosen)) + self.kinds.log_prior(chosen)
 
     def posterior(
-        self, chosen: Sequence[int], hyper: Hyper, *, instrument: bool = True, scaled: bool = False
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self, chosen: Sequence[int], hyper: Hyper, *, instrument: bool = True, scaled: bool = False,
+        width: float | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
         """Mean and covariance of inertials, common nuisances and amplitudes, in prior units.
 
         A strong effect's prior is as wide as it is large: see `evidence.posterior`.
@@ -278,8 +279,11 @@ class Space:
             hyper: Sizes and levels.
             instrument: Whether the instrument may err within its stated widths; otherwise its part is zero ...
             scaled: ... but for one scale of all torques, the first of the common nuisances.
+            width: True over stated error of the inertials, by default the one that is most probable beside the set.
         """
-        every = self.with_y(self.set_columns(chosen))
+        every, prior = self.with_y(self.set_columns(chosen)), self.prior(chosen, hyper)
+        if width is not None:
+            prior[: self.inertials] = width
         free = np.ones(len(every) - 1, dtype=bool)
         free[self.inertials : self.offset] = instrument
         free[self.inertials] |= scaled
@@ -290,7 +294,7 @@ class Space:
         named = [slice(int(e) - len(self.columns[c]), int(e)) for c, e in zip(chosen, ends, strict=True)
                  if self.candidates[c].slug != "inertials"]  # fmt: skip
         found = posterior(np.pad(H[np.ix_(at, at)], (0, 1)) + np.pad(H[at, -1:], ((0, 1), (len(at), 0))),
-                          np.arange(len(at)), named, self.prior(chosen, hyper)[at])  # fmt: skip
+                          np.arange(len(at)), named, prior[at])  # fmt: skip
         mean[at], cov[np.ix_(at, at)] = found.mean, found.cov
         for first in self._masses(chosen):
             mean, cov = truncated(mean, cov, int(first))

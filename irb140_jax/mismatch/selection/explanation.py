@@ -143,8 +143,9 @@ class Explanation:
         return near(self.space, chosen, self.hyper, columns + self.space.offset)
 
     def posterior(
-        self, chosen: tuple[int, ...] | None = None, without: np.ndarray | None = None, *, instrument: bool = True
-    ) -> Posterior:
+        self, chosen: tuple[int, ...] | None = None, without: np.ndarray | None = None, *, instrument: bool = True,
+        width: float | None = None,
+    ) -> Posterior:  # fmt: skip
         """Inertials and amplitudes in prior units, with discrepancy and nuisance parameters integrated out.
 
         Args:
@@ -152,10 +153,11 @@ class Explanation:
             without: Which blocks of the data are left out, shape (blocks,).
             instrument: Whether the instrument may err within its stated widths.  For predictions it is taken to be
                 right but for what is named, and for the drive of a servo.
+            width: True over stated error of the inertials, by default the one that is most probable beside them.
         """
         chosen = self.chosen if chosen is None else chosen
         space = self.space if without is None else self.by_block.without(without)
-        mean, cov = space.posterior(chosen, self.hyper, instrument=instrument, scaled=self.scaled)
+        mean, cov = space.posterior(chosen, self.hyper, instrument=instrument, scaled=self.scaled, width=width)
         keep = np.r_[0 : self.space.inertials, self.space.offset : len(mean)]
         return Posterior(self.columns(chosen), mean[keep], cov[np.ix_(keep, keep)])
 

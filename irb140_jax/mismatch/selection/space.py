@@ -37,8 +37,8 @@ def space_of(
     for i, c in enumerate(candidates):
         s, k = data.scale[data.nuisances + c.columns], len(c.columns)
         unit = np.where(s > 0.0, s, 1.0)
-        # What is there only if it is more than nothing, but moves nothing here, can't be found.
-        unseen = (s == 0.0) & (c.lowest == 0.0) | _throughout(data, c)
+        # What moves nothing here can't be found, nor can what is there only if all of it is more than nothing.
+        unseen = (s == 0.0) & (c.lowest == 0.0) | (s == 0.0).all() | _throughout(data, c)
         low, high = c.lowest, c.highest
         if settled:
             low = np.where(np.isin(c.variant, c.effect.law.own), np.maximum(low, c.effect.shapes.settled), low)

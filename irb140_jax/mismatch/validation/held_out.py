@@ -264,26 +264,31 @@ def _is_rare(ex: Explanation, index: int) -> bool:
 def _with_and_without(
     ex: Explanation, which: Sequence[int], left_out: list[np.ndarray]
 ) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Whitened squared error on data that the fit did not see, with a finding and without it, by joint, (n,) each."""
-    whole: dict[bool, np.ndarray] = {}
+    """Whitened squared error on data that the fit did not see, with a finding and without it, by joint, (n,) each.
+
+    Inertials may be as far off in both as they have to be without it: else what differs is how well they stand in for
+    anything, and not what the finding says.
+    """
+    whole: dict[tuple[bool, float], np.ndarray] = {}
     out = {}
     for i in which:
         judge, site = ex.judged_by(i), site_of(ex.data.candidates[i])
-        mine = next(k for k in judge.chosen if site_of(judge.data.candidates[k]) == site)
-        if (here := judge is ex) not in whole:
-            whole[here] = _unseen_errors(judge, judge.chosen, left_out)
-        out[i] = whole[here], _unseen_errors(judge, judge.others(mine), left_out)
+        fewer = judge.others(next(k for k in judge.chosen if site_of(judge.data.candidates[k]) == site))
+        key = judge is ex, judge.space.width(fewer, judge.hyper)
+        if key not in whole:
+            whole[key] = _unseen_errors(judge, judge.chosen, left_out, key[1])
+        out[i] = whole[key], _unseen_errors(judge, fewer, left_out, key[1])
     return out
 
 
-def _unseen_errors(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray]) -> np.ndarray:
-    """Whitened squared error of a set on data that its fit did not see, by joint, shape (n,)."""
+def _unseen_errors(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray], width: float) -> np.ndarray:
+    """Whitened squared error of a set on data that its fit did not see, by joint, shape (n,); see `posterior`."""
     space, energy = ex.by_block, _energy(ex, chosen)
     error, columns = np.zeros(len(space.joints)), space.with_y(space.set_columns(chosen))
-    seen = ex.posterior(chosen, instrument=False).mean
+    seen = ex.posterior(chosen, instrument=False, width=width).mean
     for fold in left_out:
         only = _only_here(ex, chosen, energy, fold)
-        mean = np.where(only, seen, ex.posterior(chosen, fold, instrument=False).mean)
+        mean = np.where(only, seen, ex.posterior(chosen, fold, instrument=False, width=width).mean)
         w = np.zeros(len(columns))
         w[: space.inertials], w[space.offset : -1], w[-1] = mean[: space.inertials], mean[space.inertials :], -1.0
         seen_by = space.without(fold)
