@@ -24,8 +24,8 @@ def servo_columns(motion: Conditioned, j: int) -> np.ndarray:
     servo = motion.servo
     if servo is None:
         return np.zeros((len(motion.t), 0))
-    damping = servo.drive.kd_width[j] * (motion.qd[:, j] - servo.asked_speed[:, j])
-    late = servo.own_delay_width * np.nan_to_num(servo.drive.kp[j]) * servo.command_rate[:, j]
+    damping = servo.drive.kd_width[j] * _against(motion)[:, j]
+    late = servo.own_delay_width * np.nan_to_num(servo.drive.kp[j]) * _of_command(motion)[:, j]
     return np.stack([damping, late], axis=1)
 
 
@@ -39,7 +39,7 @@ def common_columns(motion: Conditioned, beside: np.ndarray) -> np.ndarray:
     servo = motion.servo
     if servo is None:
         return np.zeros((*motion.q.shape, 0))
-    late = (np.nan_to_num(servo.drive.kp) * servo.command_rate)[..., None]
+    late = (np.nan_to_num(servo.drive.kp) * _of_command(motion))[..., None]
     return late * np.append(servo.drive.phase_width * beside, servo.drive.common_delay_width)
 
 
@@ -48,9 +48,27 @@ def damping_of_scale(motion: Conditioned) -> np.ndarray:
     servo = motion.servo
     if servo is None:
         return np.zeros_like(motion.q)
-    return np.nan_to_num(servo.drive.kd) * (motion.qd - servo.asked_speed)
+    return np.nan_to_num(servo.drive.kd) * _against(motion)
 
 
 def scale_width(motion: Conditioned, j: int) -> float:
     """Relative standard deviation of a servo's Kp; zero where torque was logged."""
     return 0.0 if motion.servo is None else float(np.nan_to_num(motion.servo.drive.kp_width[j]))
+
+
+def _against(motion: Conditioned) -> np.ndarray:
+    """Speed that Kd acts against, as late as the torque comes [rad/s or m/s], shape (T, n)."""
+    assert motion.servo is not None
+    return _lagging(motion, motion.qd - motion.servo.asked_speed)
+
+
+def _of_command(motion: Conditioned) -> np.ndarray:
+    """Derivative of commanded positions, as late as the torque comes [rad/s or m/s], shape (T, n)."""
+    assert motion.servo is not None
+    return _lagging(motion, motion.servo.command_rate)
+
+
+def _lagging(motion: Conditioned, x: np.ndarray) -> np.ndarray:
+    assert motion.servo is not None
+    lag = motion.servo.drive.lag
+    return np.stack([np.interp(motion.t - lag, motion.t, c) for c in x.T], axis=1) if lag else x
