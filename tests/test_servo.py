@@ -20,8 +20,11 @@ from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.errors import RecordingError
 from irb140_jax.mismatch import DiagnoseConfig, diagnose, save
 from irb140_jax.mismatch.corrected.native import native_robot
+from irb140_jax.mismatch.regression.servo import servo_columns
+from irb140_jax.mismatch.regression.sufficient_data import comparison
 from irb140_jax.recordings import Drive, Payload, drive_of_model, read_recording, stated_drive, write_recording
 from irb140_jax.recordings.band import choose_band
+from irb140_jax.recordings.drive import Times
 from irb140_jax.recordings.servo import with_servo_torques, with_torque
 from irb140_jax.report import html_report
 from irb140_jax.robot import with_phi
@@ -141,7 +144,7 @@ def test_a_late_command_and_a_torque_that_lags_are_told_apart_and_no_physics(rob
     # Simulations, which hold no lag, may lose a part of that time by commands.
     np.testing.assert_allclose(drive.delay + drive.lag, delay + lag, atol=1e-3)
     if stated:  # each joint's commands may still have a time of their own
-        np.testing.assert_allclose(drive.delay, delay, atol=1e-4)
+        np.testing.assert_allclose(drive.delay, delay, atol=3e-4)
     else:
         (said,) = (n for n in result.diagnosis.notes if n.startswith("Commands of all joints"))
         told = [float(x) for x in re.findall(r"act (\S+) .* to lag (\S+) ms", said)[0]]
@@ -178,6 +181,20 @@ def test_a_drive_that_lags_gives_the_same_torque_later():
     (now, later) = (with_torque(recording, dataclasses.replace(STATED, lag=lag)).tau for lag in (0.0, 2.0 / 200.0))
     np.testing.assert_allclose(later[2:], now[:-2], atol=1e-9)
     assert Drive.from_json(dataclasses.replace(STATED, lag=0.01).to_json()).lag == 0.01
+
+
+def test_what_the_torque_of_a_lagging_drive_errs_by_comes_as_late(robot):
+    """Derivatives of the torque that is made, by Kd and by the time of a command, are the columns of those."""
+    recording = dataclasses.replace(closed_loop(two_links(), duration=4.0)[0], drive=STATED)
+    motion = comparison(robot, [recording], 0.05, lambda _: None).later(Times(lag=0.02)).smooth[0]
+    assert motion.servo is not None
+    drive, late, inside = motion.servo.drive, motion.servo.own_delay_width, slice(40, -40)  # where nothing is cut off
+    made = lambda d: np.interp(motion.t, recording.t, with_torque(recording, d).tau[:, 0])  # noqa: E731
+    less_kd = dataclasses.replace(drive, kd=drive.kd - drive.kd_width)
+    earlier = dataclasses.replace(drive, delay=drive.delay - late)
+    for column, other in zip(servo_columns(motion, 0).T, (less_kd, earlier), strict=True):
+        change, size = made(other) - made(drive), np.abs(column).max()
+        np.testing.assert_allclose(column[inside], change[inside], atol=0.03 * size)
 
 
 def test_commands_that_are_held_from_row_to_row_act_half_a_row_late(tmp_path):

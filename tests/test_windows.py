@@ -104,7 +104,7 @@ def test_rows_are_the_same_in_windows_of_any_length(laws, monkeypatch):
         np.testing.assert_allclose(other, one, atol=1e-6 * np.abs(one).max())
 
 
-def the_grams(told=True):
+def the_grams(told: bool | np.ndarray = True):
     """Rows of the joints that are told of, and Gram matrices of all candidates."""
     noise = Noise(np.tile([1.0, -0.4, *np.zeros(ORDER - 1)], (N, 1)), np.ones((1, N)), np.ones((1, N)), np.ones(N))
     bare = judged([bare_stretch(LIB, ALONG, 0, BAND, FACTOR)])

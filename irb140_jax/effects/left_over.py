@@ -43,7 +43,7 @@ class LeftOver:
         By an orthogonal decomposition: where columns are equal to many digits, their products are no longer positive.
         """
         B = self.known.reshape(-1, self.known.shape[-1])
-        half = np.linalg.qr(np.concatenate([B, np.eye(B.shape[1])]), mode="r").T
+        half = np.asarray(np.linalg.qr(np.concatenate([B, np.eye(B.shape[1])]), mode="r")).T
         return half, linalg.solve_triangular(half, B.T @ self.y.ravel(), lower=True)
 
     @cached_property

@@ -12,6 +12,7 @@ from irb140_jax.mismatch.regression.sufficient_data import Comparison, mostly_lo
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.late_channels import delays_beside
 from irb140_jax.mismatch.validation.held_out import HeldOut
+from irb140_jax.mismatch.validation.testable import Seen
 from irb140_jax.mismatch.validation.unexplained import Structure
 from irb140_jax.recordings.payload import Payload
 from irb140_jax.robot import Robot
@@ -130,11 +131,14 @@ def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
     ]
 
 
-def unproved_notes(ex: Explanation, *, servo: bool) -> list[str]:
-    """A note for every effect that the search found and motions, of servos simulated ones too, speak against."""
+def unproved_notes(ex: Explanation, seen: Seen, *, servo: bool) -> list[str]:
+    """A note for every effect that the search found and motions, of servos simulated ones too, speak against.
+
+    What is not testable is said to be that, and no more.
+    """
     names, out = ex.lib.robot.joint_names, []
     simulated = ", or simulations from the commands," if servo else ""
-    for slug, joints in ex.unproved:
+    for slug, joints in (site for site in ex.unproved if site not in seen or seen[site][0] >= settings.VISIBLE):
         title = ex.lib.effects[slug].title
         out.append(
             f"{title[0].upper()}{title[1:]} on {', '.join(names[j] for j in joints)} would fit the torque of these "

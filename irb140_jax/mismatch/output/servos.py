@@ -192,8 +192,9 @@ def gain_notes(ex: Explanation, servo: Commanded) -> list[str]:
     each = [(ex.lib.robot.joint_names[j], *ex.kp_scale(j, servo.drive)) for j in known]
     said = ", ".join(f"{name} {100 / (1 + more):.0f} +- {100 * unsure:.0f} %" for name, more, unsure in each)
     return [
-        f"By the masses of the model Kp is really, in parts of what is stated: {said}. Friction and limits are found "
-        "in torque of the stated gains; the standard deviations of their parameters hold the difference."
+        f"By the masses of the model Kp is really, in parts of what is stated: {said}; masses that the model lacks "
+        "would look the same. Friction and limits are found in torque of the stated gains; the standard deviations of "
+        "their parameters hold the difference."
     ]
 
 

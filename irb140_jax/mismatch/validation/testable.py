@@ -15,7 +15,7 @@ from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.columns.along import columns_along, prepared, unbounded, without
 from irb140_jax.mismatch.columns.candidates import Library
 from irb140_jax.mismatch.regression.gaussian import eliminated
-from irb140_jax.mismatch.result import NotTestable
+from irb140_jax.mismatch.result import Finding, NotTestable
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.recordings.condition import Conditioned
 from irb140_jax.recordings.excite import Excitation, fourier_motion, within
@@ -169,13 +169,17 @@ def shows_no_friction(seen: Seen, effects: Mapping[str, Effect]) -> bool:
 
 
 def not_testable(
-    robot: Robot, found: set[str], seen: Seen, effects: Iterable[Effect]
+    robot: Robot, found: Iterable[Finding], seen: Seen, effects: Iterable[Effect]
 ) -> tuple[NotTestable, ...]:
-    """Effects that this motion could not have shown, with the joints where that is so."""
+    """Effects that this motion could not have shown, with the joints where that is so.
+
+    Not those that are named, nor at a joint those that may stand in the place of what is named there.
+    """
     needs = {effect.slug: effect.needs for effect in effects}
-    blind: dict[str, set[int]] = {}
+    told, blind = {(f.effect, j) for f in found for j in robot.joint_names}, dict[str, set[int]]()
+    told |= {(a.effect, j) for f in found for a in f.alternatives for j in f.joints}
     for (slug, joints), (z, _) in seen.items():
-        if z < settings.VISIBLE and slug not in found:
+        if z < settings.VISIBLE and not any((slug, robot.joint_names[j]) in told for j in joints):
             blind.setdefault(slug, set()).update(joints)
     return tuple(
         NotTestable(slug, tuple(robot.joint_names[j] for j in sorted(joints)), f"Needs {needs[slug]}.")
