@@ -95,6 +95,18 @@ def test_a_set_is_as_probable_as_its_data_over_all_widths_of_the_priors_of_inert
     assert space.log_evidence(chosen, hyper) == pytest.approx(evidence, abs=1e-8)
 
 
+def test_a_posterior_may_be_asked_for_with_another_width_of_the_inertials():
+    space, data = planted(2, {})
+    chosen, hyper = (2,), (SETTING, SETTING)
+    prior = space.prior(chosen, hyper)
+    prior[:INERTIALS] = 3.0
+    mean, cov = dense_posterior(space, data, chosen, hyper, prior)
+    found, spread = space.posterior(chosen, hyper, width=3.0)
+    np.testing.assert_allclose(found, mean, atol=1e-8)
+    np.testing.assert_allclose(spread, cov, atol=1e-8)
+    assert not np.allclose(space.posterior(chosen, hyper)[1], cov, atol=1e-5)
+
+
 def test_a_payload_whose_mass_moves_nothing_is_not_found():
     space, _ = planted(2, {4: -2.0})
     space = with_payload(space)

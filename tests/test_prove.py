@@ -16,6 +16,7 @@ from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
 from irb140_jax.mismatch.selection.explain import explain
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.selection.selected import noise_left
+from irb140_jax.mismatch.validation import held_out as proof_module
 from irb140_jax.mismatch.validation.held_out import (
     folds,
     held_out,
@@ -120,6 +121,17 @@ def test_a_rare_effect_that_other_motions_contradict_is_not_proved():
     assert unproved(contradicted(ex, rotor, 0)) == [("rotor_inertia", (1,))]
     assert {slug for slug, _ in unproved(contradicted(ex, usual, 0))} <= {"rotor_inertia"}
     assert unproved(dataclasses.replace(contradicted(ex, rotor, 0), data=of_one_recording(ex))) == []
+
+
+def test_a_finding_is_judged_beside_inertials_that_may_be_as_far_off_without_it(alike, monkeypatch):
+    asked = []
+    real = proof_module._unseen_errors
+    monkeypatch.setattr(proof_module, "_unseen_errors", lambda *a: (asked.append((a[1], a[3])), real(*a))[1])
+    held_out_gains(alike)
+    for i in alike.chosen:
+        fewer = alike.others(i)
+        width = alike.space.width(fewer, alike.hyper)
+        assert {(alike.chosen, width), (fewer, width)} <= set(asked)
 
 
 def of_one_recording(ex: Explanation) -> Data:
