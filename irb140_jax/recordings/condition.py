@@ -11,7 +11,7 @@ import numpy as np
 from scipy import interpolate, ndimage
 
 from irb140_jax.recordings.direction import REST, direction_of
-from irb140_jax.recordings.drive import LAG_WIDTH, OWN_DELAY_WIDTH, ROWS_WIDTH, Drive
+from irb140_jax.recordings.drive import ROWS_WIDTH, TIME_WIDTH, Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.payload import Payload
 from irb140_jax.recordings.recording import Recording
@@ -42,7 +42,7 @@ class Commanded:
     command_rate: np.ndarray
     asked_speed: np.ndarray
     own_delay_width: float
-    lag_width: float = LAG_WIDTH
+    lag_width: float = TIME_WIDTH
 
     @property
     def inexact(self) -> np.ndarray:
@@ -181,7 +181,7 @@ def _commanded(
     rate = np.gradient(wanted, t, axis=0)
     speed = np.zeros_like(wanted) if recording.qddes is None else filtered(
         _at(t, recording.t, recording.qddes), anti_alias)  # fmt: skip
-    width = max(OWN_DELAY_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
+    width = max(TIME_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
     return Commanded(recording.drive, _at(grid, recording.t, command), _at(grid, t, rate), _at(grid, t, speed), width)
 
 

@@ -11,11 +11,10 @@ from irb140_jax.recordings.columns import ColumnMap
 from irb140_jax.robot import servos_of
 
 GAIN_WIDTH = 0.10  # relative standard deviation of a stated Kp or Kd: of a torque constant that nobody measured
-# s by which all commands may act at another time than the first estimate says, and by which the torque of all servos
-# may come late: a sample of a controller at 1 kHz, and a few of a slow bus.  Judgements.
-COMMON_DELAY_WIDTH, LAG_WIDTH = 1e-3, 5e-3
-# s and rows by which commands of one joint may act at another time than those of all joints are found to.
-OWN_DELAY_WIDTH, ROWS_WIDTH = 1e-3, 0.1
+# s by which commands of all joints may act at another time than the first estimate says, by which those of one joint
+# may beside all others, and by which the torque of all may come late: a sample of a controller at 1 kHz.  A judgement.
+TIME_WIDTH = 1e-3
+ROWS_WIDTH = 0.1  # rows by which commands of one joint may act at another time than those of all are found to
 ARRAYS = ("kp", "kd", "limit", "low", "high", "delay", "kp_width", "kd_width")  # of a drive, one number a joint each
 PAYLOAD = "payload"  # where gains come from that a known payload shows
 SECTIONS = ("kp", "kd", "torque_limit", "command_delay")  # of the column map
@@ -83,7 +82,7 @@ class Drive:
 
         A log begins at any moment of a controller's cycle of a millisecond.  None where the delay was stated.
         """
-        return float(min(self.common_delay_width, COMMON_DELAY_WIDTH) / np.sqrt(12.0))
+        return float(min(self.common_delay_width, TIME_WIDTH) / np.sqrt(12.0))
 
     def found(self, times: Times, later: float | np.ndarray = 0.0, kd: float | np.ndarray = 0.0) -> "Drive":
         """The drive as a fit found it, without the phase of any recording.

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import interpolate
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.drive import COMMON_DELAY_WIDTH, GAIN_WIDTH, PAYLOAD, Drive, unknown_drive
+from irb140_jax.recordings.drive import GAIN_WIDTH, PAYLOAD, TIME_WIDTH, Drive, unknown_drive
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.servo_estimates import (
     KD_UNSTATED_WIDTH,
@@ -54,7 +54,7 @@ def with_servo_torques(
     drives = [r.drive or unknown_drive(robot.n) for r in servos]
     unstated = not any(d.delay.any() for d in drives)
     delay, disagreement = estimated_delay(servos, drives, robot, uncertainty) if unstated else (0.0, 0.0)
-    width = float(np.hypot(COMMON_DELAY_WIDTH, disagreement)) if unstated else 0.0
+    width = float(np.hypot(TIME_WIDTH, disagreement)) if unstated else 0.0
     rows = rows_of_joints(servos, drives, robot, (delay,))
     estimates: dict[int, Estimate] = {}
     for j in range(robot.n):
@@ -85,9 +85,13 @@ def with_torque(recording: Recording, drive: Drive) -> Recording:
 
 
 def taken_up(recording: Recording, drive: Drive) -> np.ndarray:
-    """Commanded positions, cut to their range and as late as they are stated to be [rad or m], shape (T, n)."""
+    """Commanded positions, cut to their range and as late as they are stated to be [rad or m], shape (T, n).
+
+    Between rows by a cubic that never overshoots: a straight line between two cuts off what commands accelerate by.
+    """
     t, wanted = recording.t, np.clip(np.asarray(recording.qdes), drive.low, drive.high)
-    late = [np.interp(t - d, t, x) if d else x for d, x in zip(drive.delay, wanted.T, strict=True)]
+    late = [interpolate.PchipInterpolator(t, x)(np.clip(t - d, t[0], t[-1])) if d else x
+            for d, x in zip(drive.delay, wanted.T, strict=True)]  # fmt: skip
     return np.stack(late, axis=1)
 
 

@@ -41,7 +41,7 @@ from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_
 from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.mismatch.selection.torque_scale import beside_scale, scale_of
 from irb140_jax.recordings.condition import Conditioned
-from irb140_jax.recordings.drive import LAG_WIDTH, Drive, Times
+from irb140_jax.recordings.drive import TIME_WIDTH, Drive, Times
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.payload import distinct
 from irb140_jax.robot import Robot
@@ -347,7 +347,7 @@ def _centre(space: Space, drive: Drive | None, start: _Start) -> np.ndarray:
     found[at], widths[at] = moved, settings.PAYLOAD_PLACED
     if drive is not None and start.round > 1:
         times, last = start.times, len(start.times.phases) + 1
-        found[1], widths[1] = times.lag, LAG_WIDTH
+        found[1], widths[1] = times.lag, TIME_WIDTH
         found[-last:] = *times.phases, times.delay
         widths[-last:] = *(drive.phase_width for _ in times.phases), drive.common_delay_width
     return -np.divide(found, widths, out=np.zeros(len(found)), where=widths > 0.0)
