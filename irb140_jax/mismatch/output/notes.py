@@ -134,11 +134,11 @@ def inertial_notes(ex: Explanation, uncertainty: float) -> list[str]:
 def unproved_notes(ex: Explanation, seen: Seen, *, servo: bool) -> list[str]:
     """A note for every effect that the search found and motions, of servos simulated ones too, speak against.
 
-    What is not testable is said to be that, and no more.
+    What is not testable is said to be that, and no more; but a simulation may tell what torque does not.
     """
     names, out = ex.lib.robot.joint_names, []
     simulated = ", or simulations from the commands," if servo else ""
-    for slug, joints in (site for site in ex.unproved if site not in seen or seen[site][0] >= settings.VISIBLE):
+    for slug, joints in (x for x in ex.unproved if servo or x not in seen or seen[x][0] >= settings.VISIBLE):
         title = ex.lib.effects[slug].title
         out.append(
             f"{title[0].upper()}{title[1:]} on {', '.join(names[j] for j in joints)} would fit the torque of these "
