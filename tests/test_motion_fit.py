@@ -135,7 +135,8 @@ def test_where_the_torque_lags_commands_and_damping_are_as_unsure(robot):
                  later=lambda times: data.later(times).smooth)  # fmt: skip
     free = FreeParameters.of(ex, result.model, data, (), as_predicted)
     width = {(w.kind, w.at): unit for w, unit in zip(free.parameters, free.unit, strict=True)}
-    lag = ex.torque_lag()
+    assert data.servo is not None
+    lag = ex.torque_lag(data.servo.drive)
     assert lag > 0.006 and width["later", -1] > lag and all(width["kd", j] > lag * KP[j] for j in (0, 1))
 
 

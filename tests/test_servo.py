@@ -188,7 +188,7 @@ def test_what_the_torque_of_a_lagging_drive_errs_by_comes_as_late(robot):
     recording = dataclasses.replace(closed_loop(two_links(), duration=4.0)[0], drive=STATED)
     motion = comparison(robot, [recording], 0.05, lambda _: None).later(Times(lag=0.02)).smooth[0]
     assert motion.servo is not None
-    drive, late, inside = motion.servo.drive, motion.servo.own_delay_width, slice(40, -40)  # where nothing is cut off
+    drive, late, inside = motion.servo.drive, motion.servo.drive.time_width, slice(40, -40)  # where nothing is cut off
     made = lambda d: np.interp(motion.t, recording.t, with_torque(recording, d).tau[:, 0])  # noqa: E731
     less_kd = dataclasses.replace(drive, kd=drive.kd - drive.kd_width)
     earlier = dataclasses.replace(drive, delay=drive.delay - late)

@@ -301,7 +301,7 @@ def _corrected(
     if data.servo is None:
         return _predicted(data, ex, model, proof)
     kd, late = ex.of_drives(own).T
-    later = data.servo.own_delay_width * late
+    later = data.servo.drive.time_width * late
     model = dataclasses.replace(model, drive=data.servo.drive.found(ex.times, later, kd))
     return _predicted(data.later(ex.times, later, kd), ex, model, proof)
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import interpolate, ndimage
 
 from irb140_jax.recordings.direction import REST, direction_of
-from irb140_jax.recordings.drive import ROWS_WIDTH, TIME_WIDTH, Drive
+from irb140_jax.recordings.drive import Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.payload import Payload
 from irb140_jax.recordings.recording import Recording
@@ -33,7 +33,6 @@ class Commanded:
         command: Commanded positions when they are taken up [rad or m], shape (T, n).
         command_rate: Derivative of the commanded positions, anti-aliased as the torque [rad/s or m/s], shape (T, n).
         asked_speed: Commanded speeds [rad/s or m/s], shape (T, n).
-        own_delay_width: Standard deviation of the time at which those of one joint are taken up beside all others' [s].
         lag_width: Standard deviation of how much later the torque comes than this says, never earlier [s].
     """
 
@@ -41,8 +40,7 @@ class Commanded:
     command: np.ndarray
     command_rate: np.ndarray
     asked_speed: np.ndarray
-    own_delay_width: float
-    lag_width: float = TIME_WIDTH
+    lag_width: float
 
     @property
     def inexact(self) -> np.ndarray:
@@ -181,8 +179,8 @@ def _commanded(
     rate = np.gradient(wanted, t, axis=0)
     speed = np.zeros_like(wanted) if recording.qddes is None else filtered(
         _at(t, recording.t, recording.qddes), anti_alias)  # fmt: skip
-    width = max(TIME_WIDTH, ROWS_WIDTH * float(np.median(np.diff(recording.t))))
-    return Commanded(recording.drive, _at(grid, recording.t, command), _at(grid, t, rate), _at(grid, t, speed), width)
+    command, rate, speed = (_at(grid, at, x) for at, x in ((recording.t, command), (t, rate), (t, speed)))
+    return Commanded(recording.drive, command, rate, speed, recording.drive.time_width)
 
 
 def _lost_torque(recording: Recording, grid: np.ndarray, reach: int) -> np.ndarray:

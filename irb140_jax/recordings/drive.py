@@ -11,10 +11,10 @@ from irb140_jax.recordings.columns import ColumnMap
 from irb140_jax.robot import servos_of
 
 GAIN_WIDTH = 0.10  # relative standard deviation of a stated Kp or Kd: of a torque constant that nobody measured
-# s by which commands of all joints may act at another time than the first estimate says, by which those of one joint
-# may beside all others, and by which the torque of all may come late: a sample of a controller at 1 kHz.  A judgement.
-TIME_WIDTH = 1e-3
-ROWS_WIDTH = 0.1  # rows by which commands of one joint may act at another time than those of all are found to
+# s by which commands of all joints may act at another time than the first estimate says: a sample of a controller at
+# 1 kHz.  Those of one joint may beside all others, and the torque of all may come late, by that or by so many rows,
+# whichever is more: a slow bus carries a slow log.  Judgements.
+TIME_WIDTH, ROWS_WIDTH = 1e-3, 0.1
 ARRAYS = ("kp", "kd", "limit", "low", "high", "delay", "kp_width", "kd_width")  # of a drive, one number a joint each
 PAYLOAD = "payload"  # where gains come from that a known payload shows
 SECTIONS = ("kp", "kd", "torque_limit", "command_delay")  # of the column map
@@ -49,6 +49,8 @@ class Drive:
         kd_width: Standard deviation of kd [N m s/rad or N s/m], shape (n,).
         said: Where each joint's gains come from, in the order of the joints: "model", "map", "payload", "estimate", "".
         common_delay_width: Standard deviation of the delay that all share [s]; zero where it was stated.
+        time_width: Standard deviation of the time at which commands of one joint are taken up beside all others', and
+            of how much later the torque of all comes [s].
         lag: Time by which the torque of all joints comes later than the law says [s].
     """
 
@@ -62,6 +64,7 @@ class Drive:
     kd_width: np.ndarray
     said: tuple[str, ...]
     common_delay_width: float = 0.0
+    time_width: float = TIME_WIDTH
     lag: float = 0.0
 
     def to_json(self) -> dict[str, Any]:

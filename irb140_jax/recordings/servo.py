@@ -13,7 +13,7 @@ import numpy as np
 from scipy import interpolate
 
 from irb140_jax.errors import RecordingError
-from irb140_jax.recordings.drive import GAIN_WIDTH, PAYLOAD, TIME_WIDTH, Drive, unknown_drive
+from irb140_jax.recordings.drive import GAIN_WIDTH, PAYLOAD, ROWS_WIDTH, TIME_WIDTH, Drive, unknown_drive
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.servo_estimates import (
     KD_UNSTATED_WIDTH,
@@ -61,7 +61,9 @@ def with_servo_torques(
         if any(np.isnan(d.kp[j]) or np.isnan(d.kd[j]) for d in drives):
             found = estimated_gains(rows[j])
             estimates[j] = found._replace(spread=float(np.hypot(found.spread, uncertainty)))
-    drives = [dataclasses.replace(d, delay=d.delay + delay, common_delay_width=width) for d in drives]
+    slowest = max(float(np.median(np.diff(r.t))) for r in servos)
+    widths = {"common_delay_width": width, "time_width": max(TIME_WIDTH, ROWS_WIDTH * slowest)}
+    drives = [dataclasses.replace(d, delay=d.delay + delay, **widths) for d in drives]
     out = [with_torque(r, _completed(d, estimates)) for r, d in zip(servos, drives, strict=True)]
     return out, [*_gain_notes(robot, out, drives, estimates, uncertainty), *_saturation_notes(out)]
 

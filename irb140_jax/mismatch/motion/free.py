@@ -144,7 +144,7 @@ class FreeParameters:
             at += 1
         (gain,) = TORQUE_GAIN.law.parameters
         # No simulation holds a lag of the torque: in one the same time is lost by a later command and less damping.
-        lag = ex.torque_lag()
+        lag = ex.torque_lag(drive)
         damping = np.where(prior.kd[:, 1] > 0.0, np.hypot(prior.kd[:, 1], np.nan_to_num(drive.kp) * lag), 0.0)
         for j, (of_kp, of_kd) in enumerate(zip(prior.gains[:, 1].tolist(), damping.tolist(), strict=True)):
             widths += [(FreeParameter("torque_gain", j), of_kp, gain.low - 1.0, gain.high - 1.0)]

@@ -205,7 +205,7 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     any rare effect.
     """
     more, unsure = ex.command_delay(servo.drive)
-    late, lag = float(np.min(servo.drive.delay)) + more, ex.torque_lag()
+    late, lag = float(np.min(servo.drive.delay)) + more, ex.torque_lag(servo.drive)
     out = [] if max(late, lag) < unsure or not servo.drive.common_delay_width else [
         f"Commands of all joints are taken to act {digits(1e3 * late)} +- {digits(1e3 * unsure, 1)} ms after their "
         f"row, and torque to lag {digits(1e3 * lag)} ms more: so the recordings suit the model best. Where the time is "
@@ -223,8 +223,8 @@ def command_notes(ex: Explanation, servo: Commanded) -> list[str]:
     for j in range(ex.lib.robot.n):
         own, spread = ex.own_nuisance(j, COMMAND_DELAY)
         odds = log_odds_of_any(own, spread, 1.0) + np.log(settings.RARE)
-        if odds > 0.0 and abs(servo.own_delay_width * own) > settings.NOTABLE_DELAY:
-            late, width = 1e3 * servo.own_delay_width * own, 1e3 * servo.own_delay_width * spread
+        if odds > 0.0 and abs(servo.drive.time_width * own) > settings.NOTABLE_DELAY:
+            late, width = 1e3 * servo.drive.time_width * own, 1e3 * servo.drive.time_width * spread
             way = "late" if own > 0 else "early"
             out.append(
                 f"Commands of {ex.lib.robot.joint_names[j]} act {digits(abs(late))} +- {digits(width, 1)} ms {way}; "

@@ -25,7 +25,7 @@ def servo_columns(motion: Conditioned, j: int) -> np.ndarray:
     if servo is None:
         return np.zeros((len(motion.t), 0))
     damping = servo.drive.kd_width[j] * _against(motion)[:, j]
-    late = servo.own_delay_width * np.nan_to_num(servo.drive.kp[j]) * _of_command(motion)[:, j]
+    late = servo.drive.time_width * np.nan_to_num(servo.drive.kp[j]) * _of_command(motion)[:, j]
     return np.stack([damping, late], axis=1)
 
 

@@ -9,7 +9,7 @@ from irb140_jax.mismatch import settings
 from irb140_jax.recordings.band import choose_band
 from irb140_jax.recordings.check import MOVING, checked_numbers
 from irb140_jax.recordings.condition import Commanded, Conditioned, conditioned
-from irb140_jax.recordings.drive import TIME_WIDTH, Times
+from irb140_jax.recordings.drive import Times
 from irb140_jax.recordings.lost_channels import with_lost_torque_marked
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.payload import Payload, carrying
@@ -73,8 +73,8 @@ class Comparison:
         phases = times.phases or (0.0,) * len(self.recordings)
         recordings = [_later(r, times, own + p, kd) for r, p in zip(self.recordings, phases, strict=True)]
         smooth, _ = with_motions_numbered(conditioned(recordings, self.band), recordings)
-        lag = TIME_WIDTH if times.lag > 0.0 else 0.0
-        servos = [r.servo and dataclasses.replace(r.servo, lag_width=lag) for r in smooth]
+        free = times.lag > 0.0
+        servos = [r.servo and dataclasses.replace(r.servo, lag_width=free * r.servo.drive.time_width) for r in smooth]
         smooth = [dataclasses.replace(r, servo=servo) for r, servo in zip(smooth, servos, strict=True)]
         return dataclasses.replace(self, recordings=recordings, smooth=smooth)
 

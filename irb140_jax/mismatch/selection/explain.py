@@ -41,7 +41,7 @@ from irb140_jax.mismatch.selection.selected import flexible_noise, named, noise_
 from irb140_jax.mismatch.selection.space import space_of
 from irb140_jax.mismatch.selection.torque_scale import beside_scale, scale_of
 from irb140_jax.recordings.condition import Conditioned
-from irb140_jax.recordings.drive import TIME_WIDTH, Drive, Times
+from irb140_jax.recordings.drive import Drive, Times
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.payload import distinct
 from irb140_jax.robot import Robot
@@ -318,7 +318,7 @@ def _next(given: _Given, start: _Start, ex: Explanation) -> _Start:
     times, known = start.times, start.along
     if given.later is not None and given.drive is not None:
         phases, _ = ex.phases(given.drive)
-        times = Times(ex.command_delay(given.drive)[0], ex.torque_lag(), tuple(phases.tolist()))
+        times = Times(ex.command_delay(given.drive)[0], ex.torque_lag(given.drive), tuple(phases.tolist()))
         known = [dataclasses.replace(a, recording=r) for a, r in zip(known, given.later(times), strict=True)]
     if any(ex.payloads):
         moved = zip(known, ex.payloads_found(), strict=True)
@@ -347,7 +347,7 @@ def _centre(space: Space, drive: Drive | None, start: _Start) -> np.ndarray:
     found[at], widths[at] = moved, settings.PAYLOAD_PLACED
     if drive is not None and start.round > 1:
         times, last = start.times, len(start.times.phases) + 1
-        found[1], widths[1] = times.lag, TIME_WIDTH
+        found[1], widths[1] = times.lag, drive.time_width
         found[-last:] = *times.phases, times.delay
         widths[-last:] = *(drive.phase_width for _ in times.phases), drive.common_delay_width
     return -np.divide(found, widths, out=np.zeros(len(found)), where=widths > 0.0)

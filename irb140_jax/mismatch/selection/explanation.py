@@ -21,7 +21,7 @@ from irb140_jax.mismatch.selection.falling_friction import Fall
 from irb140_jax.mismatch.selection.hyperparameters import settled
 from irb140_jax.mismatch.selection.late_channels import Late
 from irb140_jax.mismatch.selection.screening import gains, near, reshaped
-from irb140_jax.recordings.drive import TIME_WIDTH, Drive, Times
+from irb140_jax.recordings.drive import Drive, Times
 from irb140_jax.recordings.low_pass import Band
 from irb140_jax.recordings.payload import Payload, distinct
 
@@ -191,9 +191,9 @@ class Explanation:
         more, unsure = self._common(self.space.offset - 1, stated.common_delay_width)
         return max(self.times.delay + more, -float(np.min(stated.delay))), unsure
 
-    def torque_lag(self) -> float:
+    def torque_lag(self, stated: Drive) -> float:
         """Lag of all torques behind what commands and positions say [s]; none comes before."""
-        return max(self.times.lag + self._common(self.space.inertials + 1, TIME_WIDTH)[0], 0.0)
+        return max(self.times.lag + self._common(self.space.inertials + 1, stated.time_width)[0], 0.0)
 
     def own_nuisance(self, j: int, which: int, without: np.ndarray | None = None) -> tuple[float, float]:
         """One of a joint's own nuisance parameters and its standard deviation, both in prior standard deviations.
