@@ -169,7 +169,7 @@ def shows_no_friction(seen: Seen, effects: Mapping[str, Effect]) -> bool:
 
 
 def not_testable(
-    robot: Robot, found: Iterable[Finding], seen: Seen, effects: Iterable[Effect]
+    robot: Robot, found: Sequence[Finding], seen: Seen, effects: Iterable[Effect]
 ) -> tuple[NotTestable, ...]:
     """Effects that this motion could not have shown, with the joints where that is so.
 
