@@ -17,7 +17,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import tyro
-from pages import FIRST_ENGINE, page_of
+from pages import page_of
 
 from irb140_jax.compilation_cache import set_up_compilation_cache
 from irb140_jax.errors import InputError
@@ -166,7 +166,7 @@ def page(rows: list[dict]) -> str:
     count = lambda key, what: sum(r[key]["state"] == what for r in left)  # noqa: E731
     states = ("named", "open", "not testable", "missed", "wrong")
     lines = [
-        "# Cases left open, and motions that decide them", "", FIRST_ENGINE, "",
+        "# Cases left open, and motions that decide them", "",
         "Written by `experiments/ambiguous.py` from `results/ambiguous.jsonl`. In each case MuJoCo hides one effect",
         "in a random robot. On fast motions the effect makes 8 to 20 % of the joint's torque. Two poor motions of 12",
         "s are recorded: slow motions, small motions, or motions of another joint only. Inertials are 5 % wrong,",
