@@ -89,14 +89,14 @@ class _Task:
         recordings: Of this robot.
         config: Options.
         progress: Told what is being done, a few words at a time.
-        whole: How long all was recorded [s], where some time is left out already.
+        whole: How long all was recorded [s] where some time is left out already, else zero.
     """
 
     robot: Robot
     recordings: Sequence[Recording]
     config: DiagnoseConfig
     progress: Callable[[str], None]
-    whole: float = 0.0
+    whole: float
 
     def of(self, recordings: Sequence[Recording], recorded: float) -> "_Task":
         """The same of other rows, where so much had been recorded [s]."""
@@ -144,7 +144,7 @@ def diagnose(
     make_room_for_programs()  # hundreds of robots in one process would crash it
     # Thousands of small solves: a second BLAS thread costs more in waking up than it does.
     with threadpool_limits(1, "blas"):
-        return _diagnosed(_Task(robot, recordings, config or DiagnoseConfig(), _giving_back(progress)))
+        return _diagnosed(_Task(robot, recordings, config or DiagnoseConfig(), _giving_back(progress), whole=0.0))
 
 
 def _giving_back(progress: Callable[[str], None]) -> Callable[[str], None]:

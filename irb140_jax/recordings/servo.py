@@ -61,9 +61,8 @@ def with_servo_torques(
         if any(np.isnan(d.kp[j]) or np.isnan(d.kd[j]) for d in drives):
             found = estimated_gains(rows[j])
             estimates[j] = found._replace(spread=float(np.hypot(found.spread, uncertainty)))
-    slowest = max(float(np.median(np.diff(r.t))) for r in servos)
-    widths = {"common_delay_width": width, "time_width": max(TIME_WIDTH, ROWS_WIDTH * slowest)}
-    drives = [dataclasses.replace(d, delay=d.delay + delay, **widths) for d in drives]
+    own = max(TIME_WIDTH, *(ROWS_WIDTH * float(np.median(np.diff(r.t))) for r in servos))
+    drives = [dataclasses.replace(d, delay=d.delay + delay, common_delay_width=width, time_width=own) for d in drives]
     out = [with_torque(r, _completed(d, estimates)) for r, d in zip(servos, drives, strict=True)]
     return out, [*_gain_notes(robot, out, drives, estimates, uncertainty), *_saturation_notes(out)]
 

@@ -39,8 +39,9 @@ def assembled(lib: Library, stretches: list[Stretch], uncertainty: float) -> Dat
     """Rows that hold the columns of a whole library, those of joints judged, with the prior scale of every column."""
     joints, amplitudes = lib.entries
     power = sum(np.einsum("te,te->e", x, x) for x in (s.amplitudes[:, joints, amplitudes] for s in stretches))
-    scale = prior_scale(lib, stretches, uncertainty, np.asarray(power))
-    return Data(judged(stretches), scale, with_loose_inertials(lib), 10 * lib.robot.n)
+    rows = judged(stretches)
+    scale = prior_scale(lib, rows, uncertainty, np.asarray(power))
+    return Data(rows, scale, with_loose_inertials(lib), 10 * lib.robot.n)
 
 
 def prior_scale(lib: Library, stretches: list[Stretch], uncertainty: float, power: np.ndarray) -> np.ndarray:
@@ -48,7 +49,7 @@ def prior_scale(lib: Library, stretches: list[Stretch], uncertainty: float, powe
 
     Args:
         lib: The candidates.
-        stretches: One per recording.
+        stretches: One per recording, rows of joints judged.
         uncertainty: Stated relative standard deviation of the inertials.
         power: Sum of the squares of each column that isn't zero throughout, over all rows, shape (entries,).
     """
@@ -57,7 +58,7 @@ def prior_scale(lib: Library, stretches: list[Stretch], uncertainty: float, powe
     torque = np.sqrt(sum(np.sum(s.tau**2, axis=0) for s in stretches) / rows)
     joints, amplitudes = lib.entries
     rms, typical = np.sqrt(power / rows), np.full(lib.size, np.inf)
-    tells = np.any([s.use.any(axis=0) for s in judged(stretches)], axis=0)
+    tells = np.any([s.use.any(axis=0) for s in stretches], axis=0)
     seen = (rms > ROUNDING * torque[joints]) & tells[joints]
     np.minimum.at(typical, amplitudes[seen], torque[joints[seen]] / rms[seen])
     typical[~np.isfinite(typical)] = 0.0

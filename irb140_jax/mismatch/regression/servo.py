@@ -69,6 +69,7 @@ def _of_command(motion: Conditioned) -> np.ndarray:
 
 
 def _lagging(motion: Conditioned, x: np.ndarray) -> np.ndarray:
+    """Anything along a motion, (T, n), later by the lag of its drive."""
     assert motion.servo is not None
     lag = motion.servo.drive.lag
     return np.stack([np.interp(motion.t - lag, motion.t, c) for c in x.T], axis=1) if lag else x
