@@ -10,12 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import interpolate, ndimage
 
+from irb140_jax.recordings.delayed_commands import taken_up
 from irb140_jax.recordings.direction import REST, direction_of
 from irb140_jax.recordings.drive import Drive
 from irb140_jax.recordings.low_pass import Band, convolved, filtered, kernels
 from irb140_jax.recordings.payload import Payload
 from irb140_jax.recordings.recording import Recording
-from irb140_jax.recordings.servo import taken_up
 from irb140_jax.recordings.smooth import white_density, without_noise
 
 CREEPING = 1e-3  # of a joint's highest speed in any recording: slower, what holds it may be dry friction that gives way

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import interpolate
 
 from irb140_jax.errors import RecordingError
+from irb140_jax.recordings.delayed_commands import taken_up
 from irb140_jax.recordings.drive import GAIN_WIDTH, PAYLOAD, ROWS_WIDTH, TIME_WIDTH, Drive, unknown_drive
 from irb140_jax.recordings.recording import Recording
 from irb140_jax.recordings.servo_estimates import (
@@ -83,17 +84,6 @@ def with_torque(recording: Recording, drive: Drive) -> Recording:
         tau, lost = (np.stack([np.interp(t, recording.t, x) for x in of.T], axis=1) for of in (tau, 1.0 * lost))
         lost = lost > 0.0
     return dataclasses.replace(recording, tau=tau, drive=drive, torque_lost=lost if lost.any() else None)
-
-
-def taken_up(recording: Recording, drive: Drive) -> np.ndarray:
-    """Commanded positions, cut to their range and as late as they are stated to be [rad or m], shape (T, n).
-
-    Between rows by a cubic that never overshoots: a straight line between two cuts off what commands accelerate by.
-    """
-    t, wanted = recording.t, np.clip(np.asarray(recording.qdes), drive.low, drive.high)
-    late = [interpolate.PchipInterpolator(t, x)(np.clip(t - d, t[0], t[-1])) if d else x
-            for d, x in zip(drive.delay, wanted.T, strict=True)]  # fmt: skip
-    return np.stack(late, axis=1)
 
 
 def speed(recording: Recording) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import linalg, special
 from scipy.optimize import nnls
 
+from irb140_jax.recordings.delayed_commands import delayed_commands
 from irb140_jax.recordings.drive import GAIN_WIDTH, Drive
 from irb140_jax.recordings.glance import at_a_glance, glance
 from irb140_jax.recordings.payload import carrying
@@ -73,7 +74,8 @@ def rows_of_joints(
     for r, d in zip(servos, drives, strict=True):
         seen = glance(r)
         total = nominal_torques(carrying(robot, r.payload), seen.q, seen.qd, seen.qdd).total
-        smooth = lambda x, r=r, d=d: at_a_glance(r.t, _later(r, d, x))  # noqa: E731
+        at = delayed_commands(r, d)
+        smooth = lambda x, r=r, at=at: at_a_glance(r.t, at(x))  # noqa: E731
         late, told = [smooth(x) - seen.q for x in delays], [smooth(x) for x in BEFORE]
         for j in range(robot.n):
             qd = seen.qd[:, j]
@@ -98,11 +100,6 @@ def _joined(parts: Sequence[Rows]) -> Rows:
         kp=np.concatenate([part.kp for part in parts]),
         kd=np.concatenate([part.kd for part in parts]),
     )
-
-
-def _later(r: Recording, d: Drive, delay: float) -> np.ndarray:
-    wanted = np.clip(np.asarray(r.qdes), d.low, d.high)
-    return np.stack([np.interp(r.t - delay - x, r.t, w) for x, w in zip(d.delay, wanted.T, strict=True)], axis=1)
 
 
 def estimated_delay(
