@@ -34,6 +34,19 @@ def test_a_copy_under_another_name_is_left_out_and_said():
     assert notes == ["copy holds the same log as motion 0, run 0 and was left out."]
 
 
+@pytest.mark.parametrize(
+    ("cut", "digits", "part"), [(slice(400, None), 8, True), (slice(300, 1500, 2), 6, True), (slice(None), 2, False)]
+)
+def test_a_part_of_a_log_that_was_written_again_is_left_out_and_said(cut, digits, part):
+    one, other = run(0, 0), run(0, 1)
+    rounded = {k: np.array([float(f"{x:.{digits}g}") for x in getattr(one, k)[cut].ravel()]).reshape(-1, 1)
+               for k in ("q", "tau")}  # fmt: skip
+    again = dataclasses.replace(one, t=one.t[cut] - one.t[cut][0], qd=None, source="again", **rounded)
+    kept, notes = without_copies([again, one, other])
+    assert [r.source for r in kept] == ["again"] * (not part) + ["motion 0, run 0", "motion 0, run 1"]
+    assert notes == ["again holds a part of the log in motion 0, run 0 and was left out."] * part
+
+
 def test_evidence_does_not_grow_by_repetition():
     robot = made.robot(pendulum=True)
     once = diagnose(robot, [run(0, 0), run(1, 0)]).diagnosis.to_json()
