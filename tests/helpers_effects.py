@@ -25,7 +25,7 @@ def rigid_body(rng, samples):
     n = len(KINDS)
     across, _ = np.linalg.qr(rng.normal(size=(3, 2)))
     shapes = ((samples, n, 3), (), None, (samples, n, 10), (samples, n, n), (samples, n, n), (n,), (samples, n, n),
-              (samples, 3), (samples, n, 3))  # fmt: skip
+              (samples, 3), (samples, n, 6))  # fmt: skip
     body = RigidBody(*(jnp.asarray(across.T if s is None else rng.normal(size=s)) for s in shapes))
     # A link without inertia, or pushed away by its own motion, is no machine.
     return eqx.tree_at(lambda r: (r.mass, r.by_qd, r.by_q), body, (

@@ -24,7 +24,8 @@ def path(seed: int, rows: int = 900) -> tuple[np.ndarray, np.ndarray]:
     turned = lambda a: np.outer(-np.sin(a), x) + np.outer(np.cos(a), y)  # noqa: E731
     tool = 0.3 * ACROSS + 0.4 * along(q1) + 0.3 * along(q1 + q2)
     second = 0.3 * turned(q1 + q2)
-    return tool, np.stack([0.4 * turned(q1) + second, second], axis=1)
+    velocities = np.stack([0.4 * turned(q1) + second, second], axis=1)
+    return tool, np.concatenate([velocities, np.broadcast_to(ACROSS, velocities.shape)], axis=2)
 
 
 def left_over(seed: int, normal: np.ndarray) -> tuple[LeftOver, np.ndarray]:
@@ -87,18 +88,20 @@ def test_walls_that_are_alike_push_alike(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_forces_that_are_alike_move_no_joint_otherwise_and_only_where_there_are_such(seed):
-    shape = np.array([1.0, 3.0, 1.0, 0.02])
-    force = np.random.default_rng(seed).normal(size=3)
+    shape, rng = np.array([1.0, 3.0, 1.0, 0.02]), np.random.default_rng(seed)
+    w = rng.normal(size=6)
     left, _ = left_over(seed, np.array([0.0, 1.0, 0.0]))
-    alike = external_wrench._alike(left, force, shape)
-    np.testing.assert_allclose(np.delete(alike, [3, 4, 5], axis=1), [shape, shape])
-    forces = alike[:, 3:6]
-    # As strong as the push, either way, across the plane.
-    expected = np.linalg.norm(force) * np.array([ACROSS, -ACROSS])
-    np.testing.assert_allclose(sorted((forces - force).tolist()), sorted(expected.tolist()), atol=1e-9)
-    np.testing.assert_allclose(left.tool_jacobian @ (forces[0] - force), 0.0, atol=1e-9)
-    turned = dataclasses.replace(left, tool_jacobian=left.tool_jacobian + np.outer(np.sin(left.t), ACROSS)[:, None])
-    assert external_wrench._alike(turned, force, shape).shape == (0, 7)
+    alike = external_wrench._alike(left, w, shape)
+    assert alike.shape == (6, 10)  # a force across the plane and moments about two axes in it, either way
+    np.testing.assert_allclose(np.delete(alike, range(3, 9), axis=1), np.tile(shape, (6, 1)))
+    others = alike[:, 3:9] / external_wrench.LEVERS - w
+    np.testing.assert_allclose(left.tool_jacobian @ others.T, 0.0, atol=1e-9)
+    # As strong as the push.
+    strong = np.linalg.norm(np.where(np.arange(6) < 3, others, 0.0), axis=1)
+    np.testing.assert_allclose(np.sort(strong), np.append(np.zeros(4), [np.linalg.norm(w[:3])] * 2), atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(others, axis=1).max(), max(np.linalg.norm(w[:3]), np.linalg.norm(w[3:])))
+    turned = dataclasses.replace(left, tool_jacobian=rng.normal(size=left.tool_jacobian.shape))
+    assert external_wrench._alike(turned, w, shape).shape == (0, 10)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -136,12 +136,12 @@ LAWS_OF_MOTION = {
     "joint_elasticity": lambda p, m, j: moved(m, j, swing(p, m, j)),
     "backlash": lambda p, m, j: moved(m, j, flight(p, m, j)),
     "contact": lambda p, m, j: -np.stack([
-        p["stiffness"] * max(p["position"] - n @ x, 0.0) * (J @ n)
+        p["stiffness"] * max(p["position"] - n @ x, 0.0) * (J[:, :3] @ n)
         for n in [np.array([p["normal_x"], p["normal_y"], p["normal_z"]])]
         for x, J in zip(np.asarray(m.rigid.tool), np.asarray(m.rigid.tool_jacobian), strict=True)]),
     "external_wrench": lambda p, m, j: -np.stack([
         (1 / (1 + np.exp(-2 * (t - p["t0"]) / p["rise"])) - 1 / (1 + np.exp(-2 * (t - p["t1"]) / p["rise"])))
-        * (J @ [p["force_x"], p["force_y"], p["force_z"]])
+        * (J @ [p[f"{of}_{axis}"] for of in ("force", "moment") for axis in "xyz"])
         for t, J in zip(np.asarray(m.t), np.asarray(m.rigid.tool_jacobian), strict=True)]),
 }  # fmt: skip
 

@@ -104,7 +104,7 @@ def _around(best, turns, tilt, shift):
 def _wall(tool, tool_jacobian, shape, xp):
     """Torque per unit of stiffness, shape (T, n)."""
     depth = xp.maximum(shape[3] - tool @ shape[:3], 0.0)
-    return -depth[:, None] * (tool_jacobian @ shape[:3])
+    return -depth[:, None] * (tool_jacobian[..., :3] @ shape[:3])
 
 
 def _gain(left, walls):

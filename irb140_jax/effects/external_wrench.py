@@ -1,4 +1,4 @@
-"""External wrench: someone or something pushes the tool for a while."""
+"""External wrench: someone or something pushes the last link for a while, at the tool or beside it."""
 
 import itertools
 
@@ -18,18 +18,23 @@ SHORTEST = 0.2  # s; what lasts less is a blow, or a misfit
 THIN = 2  # every second row in the scan; the grid of the search then sees all
 NEAR = (-1.0, 0.0, 1.0)  # grid around the best start and end, in steps
 STEP = 0.05  # s, first step of that grid
+LEVER = 0.1  # [m] at which moments about the tool count like forces
+LEVERS = np.repeat([1.0, LEVER], 3)
+FORCE, WRENCH = (0, 1, 2), (0, 1, 2, 3, 4, 5)  # columns of a push at the tool, and of one anywhere
 UNFELT = 1e-3  # of the strongest direction of the tool's Jacobian: forces along it move no joint
 
 
 def _columns(motion, joints, shape):
-    """tau = -J^T f on the motors, while t0 < t < t1 of one recording: a constant force on the tool, in world axes."""
+    """tau = -J^T [f, m] on the motors, while t0 < t < t1 of one recording: a constant wrench at the tool."""
     here = jnp.where(motion.recording + 1.0 == shape[2], 1.0, 0.0)
-    return -here * _window(motion.t, shape[0], shape[1], shape[3], jnp)[:, None, None] * motion.rigid.tool_jacobian
+    jacobian = motion.rigid.tool_jacobian * jnp.array(LEVERS)
+    return -here * _window(motion.t, shape[0], shape[1], shape[3], jnp)[:, None, None] * jacobian
 
 
 def _from_physical(values):
     shape = [values[k] for k in ("t0", "t1", "recording", "rise")]
-    return np.array([values[f"force_{k}"] for k in "xyz"]), np.array(shape)
+    moment = [values.get(f"moment_{k}", 0.0) / LEVER for k in "xyz"]
+    return np.array([*(values[f"force_{k}"] for k in "xyz"), *moment]), np.array(shape)
 
 
 def _grid(scales, joints):
@@ -55,7 +60,7 @@ def _proposal(left, scales, joints):
     best, gain, left = None, -np.inf, left.every(THIN)
     for recording in np.unique(left.recording):
         rows = left.recording == recording
-        t, J = left.t[rows], left.tool_jacobian[rows]
+        t, J = left.t[rows], left.tool_jacobian[rows] * LEVERS
         edges = np.linspace(t[0], t[-1], EDGES)
         spans = np.array([
             s for s in itertools.combinations(edges, 2) if SHORTEST < s[1] - s[0] < LONGEST * (t[-1] - t[0])
@@ -77,21 +82,27 @@ def _proposal(left, scales, joints):
 
 
 def _alike(left, w, shape):
-    _, size, axes = np.linalg.svd(left.tool_jacobian.reshape(-1, 3), full_matrices=False)
-    unfelt = axes[size < UNFELT * max(size[0], 1e-300)] * np.linalg.norm(w)
-    return np.array([[*shape[:3], *(w + s * a), *shape[3:]] for a in unfelt for s in (-1.0, 1.0)]).reshape(-1, 7)
+    unfelt = []
+    for columns in (slice(0, 3), slice(3, 6)):  # a force and a moment that together do nothing stay within intervals
+        _, size, axes = np.linalg.svd(left.tool_jacobian[..., columns].reshape(-1, 3), full_matrices=False)
+        for axis in axes[size < UNFELT * max(size[0], 1e-300)] * np.linalg.norm(w[columns]):
+            unfelt.append(np.zeros(6))
+            unfelt[-1][columns] = axis
+    forces = [LEVERS * (w + s * a) for a in unfelt for s in (-1.0, 1.0)]
+    return np.array([[*shape[:3], *f, *shape[3:]] for f in forces]).reshape(-1, 10)
 
 
 def _blur(shape):
     edge = BLUR * float(shape[3])
-    return np.array([edge, edge, 0.0, 0.0, 0.0, 0.0, edge])
+    return np.array([edge, edge, *(0.0,) * 7, edge])
 
 
 def _where(values, units):
-    force = np.array([values[f"force_{k}"] for k in "xyz"])
+    force, moment = (np.array([values[f"{of}_{k}"] for k in "xyz"]) for of in ("force", "moment"))
+    beside = f" and a moment of {np.linalg.norm(moment):.3g} N m about it" if moment.any() else ""
     return (
         f"from {values['t0']:.3g} to {values['t1']:.3g} s of recording {values['recording']:.0f}, a force "
-        f"of {np.linalg.norm(force):.3g} N at the tool"
+        f"of {np.linalg.norm(force):.3g} N at the tool{beside}"
     )
 
 
@@ -111,7 +122,7 @@ EFFECT = Effect(
     },
     where=_where,
     law=Law(
-        equation="-J_tool(q)^T f, t0 < t < t1",
+        equation="-J_tool(q)^T [f, m], t0 < t < t1",
         source="De Luca, Albu-Schaeffer, Haddadin, Hirzinger, IROS 2006; scan: Siegmund, Sequential Analysis, 1985",
         parameters=(
             Parameter("t0", "s"),
@@ -120,13 +131,16 @@ EFFECT = Effect(
             Parameter("force_x", "N"),
             Parameter("force_y", "N"),
             Parameter("force_z", "N"),
+            Parameter("moment_x", "N m"),
+            Parameter("moment_y", "N m"),
+            Parameter("moment_z", "N m"),
             Parameter("rise", "s", low=0.0),
         ),
         columns=_columns,
-        to_physical=lambda w, shape: jnp.concatenate([shape[:3], w, shape[3:]]),
+        to_physical=lambda w, shape: jnp.concatenate([shape[:3], w * jnp.array(LEVERS), shape[3:]]),
         from_physical=_from_physical,
-        variants=((0, 1, 2),),
-        own=(0, 1, 2),
+        variants=(FORCE, WRENCH),
+        own=WRENCH,
     ),
     place=Place(sites=all_joints, everywhere=True),
     shapes=Shapes(

@@ -17,7 +17,7 @@ class LeftOver:
         t: Time since that recording began [s], shape (R,).
         q: Joint positions [rad or m], shape (R, n).
         tool: Position of the tool in the world [m], shape (R, 3).
-        tool_jacobian: Velocity of the tool per joint speed, shape (R, n, 3).
+        tool_jacobian: Velocity and angular velocity of the tool per joint speed, shape (R, n, 6).
         weight: One over the standard deviation of the noise; 0 for rows that don't count, shape (R, n).
         y: Torque that the nominal model leaves, in standard deviations, shape (R, n).
         known: Columns of what explains it so far, in standard deviations per prior unit, shape (R, n, k).
@@ -27,7 +27,7 @@ class LeftOver:
     t: Float[np.ndarray, " R"]
     q: Float[np.ndarray, "R n"]
     tool: Float[np.ndarray, "R 3"]
-    tool_jacobian: Float[np.ndarray, "R n 3"]
+    tool_jacobian: Float[np.ndarray, "R n 6"]
     weight: Float[np.ndarray, "R n"]
     y: Float[np.ndarray, "R n"]
     known: Float[np.ndarray, "R n k"]

@@ -19,7 +19,7 @@ class RigidBody(eqx.Module):
         spring: Stiffness of the model's own springs, shape (n,).
         mass: Joint-space mass matrix, links only, shape (T, n, n).
         tool: Position of the tool in the world [m], shape (T, 3).
-        tool_jacobian: Velocity of the tool per joint speed, world axes [m or 1], shape (T, n, 3).
+        tool_jacobian: Velocity and angular velocity of the tool per joint speed, world axes, shape (T, n, 6).
     """
 
     by_gravity: Float[Array, "T n 3"]
@@ -31,7 +31,7 @@ class RigidBody(eqx.Module):
     spring: Joints
     mass: Float[Array, "T n n"]
     tool: Float[Array, "T 3"]
-    tool_jacobian: Float[Array, "T n 3"]
+    tool_jacobian: Float[Array, "T n 6"]
 
 
 class Asked(eqx.Module):

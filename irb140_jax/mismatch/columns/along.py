@@ -213,14 +213,14 @@ def _torque(robot: Robot, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.
 
 
 def tool_along(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Position of the tool in the world, (T, 3), and its velocity per joint speed, (T, n, 3)."""
+    """Position of the tool in the world, (T, 3), and its velocity and angular velocity per joint speed, (T, n, 6)."""
     both = np.asarray(in_chunks(_tool_of_chunk, robot, (q,)))
-    return both[:, 0], both[:, 1:]
+    return both[:, 0, :3], both[:, 1:]
 
 
-def _tool_of_chunk(robot: Robot, q: JointSamples) -> Float[Array, "T n+1 3"]:
-    place = lambda x: kinematics.forward_kinematics(robot, x)[:3, 3]  # noqa: E731
-    velocity = lambda x: kinematics.jacobian(robot, x)[:3].T  # noqa: E731
+def _tool_of_chunk(robot: Robot, q: JointSamples) -> Float[Array, "T n+1 6"]:
+    place = lambda x: jnp.pad(kinematics.forward_kinematics(robot, x)[:3, 3], (0, 3))  # noqa: E731
+    velocity = lambda x: kinematics.jacobian(robot, x).T  # noqa: E731
     return jax.vmap(lambda x: jnp.concatenate([place(x)[None], velocity(x)]))(q)
 
 

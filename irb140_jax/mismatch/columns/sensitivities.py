@@ -83,9 +83,9 @@ class Sensitivities(eqx.Module):
         return jax.vmap(lambda q: kinematics.forward_kinematics(self.robot, q)[:3, 3])(self.q)
 
     @property
-    def tool_jacobian(self) -> Float[Array, "T n 3"]:
-        """Velocity of the tool per joint speed, world axes."""
-        return jax.vmap(lambda q: kinematics.jacobian(self.robot, q)[:3].T)(self.q)
+    def tool_jacobian(self) -> Float[Array, "T n 6"]:
+        """Velocity and angular velocity of the tool per joint speed, world axes."""
+        return jax.vmap(lambda q: kinematics.jacobian(self.robot, q).T)(self.q)
 
     @property
     def mass(self) -> Float[Array, "T n n"]:

@@ -54,7 +54,7 @@ class Stretch:
         use: Those of them in which the joint moves, (R, n).
         q, qd, qdd: Motion at the rows, (R, n), for maps and the flexible competitor.
         motion, repeats: Which motion it is of, and of how many recordings that is; see `Conditioned`.
-        tool, tool_jacobian: Where the tool is and how joints move it, (R, 3) and (R, n, 3); see `RigidBody`.
+        tool, tool_jacobian: Where the tool is and how joints move it, (R, 3) and (R, n, 6); see `RigidBody`.
     """
 
     recording: int
