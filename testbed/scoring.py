@@ -126,7 +126,7 @@ def located(line: dict[str, Any]) -> list[tuple[str, str]]:
 def places(line: dict[str, Any]) -> list[tuple[str, bool]]:
     """Of each thing without a name that is located: its kind, and whether what it depends on is said rightly."""
     return [
-        (h["kind"], any(word in u["where"].partition(" depends on ")[2] for word in h["depends"]))
+        (h["kind"], any(word in u["where"].partition(" depends on ")[2].partition(";")[0] for word in h["depends"]))
         for h in line["truth"]["hidden"] if h.get("depends")
         for u in line["diagnosis"]["unexplained"] if set(u["joints"]) & set(h["joints"])
     ]  # fmt: skip

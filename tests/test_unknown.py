@@ -13,9 +13,9 @@ from irb140_jax.mismatch.output.notes import slight_notes
 from irb140_jax.mismatch.regression.discrepancy import relaxed
 from irb140_jax.mismatch.regression.noise import Noise
 from irb140_jax.mismatch.validation import unexplained
-from irb140_jax.mismatch.validation.competitors import Rows, competitors
+from irb140_jax.mismatch.validation.competitors import Axis, Rows, competitors
 from irb140_jax.mismatch.validation.held_out import HeldOut
-from irb140_jax.mismatch.validation.unexplained import predicted, shortest
+from irb140_jax.mismatch.validation.unexplained import carrier, narrowest, predicted, shortest
 from irb140_jax.recordings.conceal import Concealment, conceal, random_robot
 from irb140_jax.recordings.concealed.plant import arm_spec
 from irb140_jax.recordings.excite import three_motions
@@ -103,6 +103,21 @@ def test_a_short_time_that_holds_most_of_what_is_left_is_told_and_a_long_one_is_
     assert when.of_torque == pytest.approx(30.0 / 50.0, rel=0.2)
 
 
+@pytest.mark.parametrize("stop", [0.9, 0.2])
+def test_a_narrow_part_of_the_range_that_holds_most_of_what_is_left_is_told_and_a_wide_one_is_not(stop):
+    rng, t = np.random.default_rng(2), 0.01 * np.arange(4000)
+    q = np.sin(t)[:, None]
+    logs: Any = [SimpleNamespace(q=q), SimpleNamespace(q=-q)]
+    left = [rng.normal(size=4000) * np.where(s.q[:, 0] > stop, 30.0, 1.0) for s in logs]
+    where = narrowest(logs, left, Axis("q", 0))
+    assert narrowest(logs, left, Axis("t", 0)) is None
+    if 1.0 - stop > 2.0 * settings.BRIEF:
+        assert where is None
+        return
+    assert where is not None and stop < where.begin < where.end < 1.0
+    assert settings.MOST_OF_ERROR <= where.share < settings.MOST_OF_ERROR + 0.01
+
+
 T = 0.02 * np.arange(1500)
 
 
@@ -113,17 +128,16 @@ def moving(slow, fast, phase):
     return q, qd, np.gradient(qd, T)
 
 
-def shares_of(law):
-    """Share that each competitor predicts of what `law` leaves at the first of two joints: words -> best."""
+def competing(law):
+    """The competitors that know the motion, and the share that each predicts of what `law` leaves at one of two joints.
+    """
     joints = [moving(0.7, 1.1, 1.0), moving(0.53, 1.37, 2.0)]
     columns = {name: np.stack([x[k] for x in joints], axis=1) for k, name in enumerate(("q", "qd", "qdd"))}
     columns["nominal"] = columns["tau"] = np.cos(columns["q"]) + 0.1 * columns["qdd"]
     one: Any = SimpleNamespace(t=T, begin=0.0, motion=0, **columns)
     rows = Rows([np.full(1500, True)], law(columns), np.ones(1500), np.zeros(1500, int))
-    out: dict[str, float] = {}
-    for c in competitors([one], 0, rows, ("hinge", "neighbour")):
-        out[c.variable] = max(predicted(c, rows.residual[:, None], rows)[0], out.get(c.variable, -np.inf))
-    return out
+    rivals = [c for c in competitors([one], 0, rows, ("hinge", "neighbour")) if c.shifts]
+    return rivals, np.array([predicted(c, rows.residual[:, None], rows)[0] for c in rivals])
 
 
 def hose(x):
@@ -146,10 +160,9 @@ def hose(x):
     ids=["teeth", "latch", "led cable", "gyroscope", "hysteresis", "hose"],
 )  # fmt: skip
 def test_what_is_left_is_said_to_depend_on_what_made_it(law, words):
-    shares = shares_of(law)
-    del shares["time more than on the motion"]  # whatever is slow goes with time as well
-    found = shares.pop(words)
-    assert found > 0.8 and max(shares.values()) < found
+    rivals, shares = competing(law)  # without time, with which whatever is slow goes as well
+    chosen = carrier(rivals, shares)
+    assert rivals[chosen].variable == words and shares[chosen] > 0.8
 
 
 def test_what_a_neighbours_torque_makes_in_loud_and_quiet_recordings_is_said_to_depend_on_it():

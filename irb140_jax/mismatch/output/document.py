@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -42,10 +43,11 @@ from irb140_jax.mismatch.regression.sufficient_data import Comparison
 from irb140_jax.mismatch.result import Diagnosis, Finding, Fit, Provenance, Unexplained
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.blocked import Blocked
+from irb140_jax.mismatch.validation.competitors import Axis
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.mismatch.validation.testable import Seen, not_testable, shows_no_friction
 from irb140_jax.mismatch.validation.undecided_joints import torque_size, undecidable
-from irb140_jax.mismatch.validation.unexplained import Structure
+from irb140_jax.mismatch.validation.unexplained import Structure, When, Where, narrowest, shortest
 from irb140_jax.mismatch.validation.unexplained_time import mostly_unexplained
 from irb140_jax.recordings.condition import Commanded
 from irb140_jax.robot import Robot
@@ -221,26 +223,45 @@ def fit_by_joint(robot: Robot, proof: HeldOut, scatter: np.ndarray, *, at_rest: 
 def _unexplained(robot: Robot, s: Structure, recordings: Sequence[str]) -> Unexplained:
     name, unit = robot.joint_names[s.joint], robot.torque_units[s.joint]
     where = f"{name}: {s.rms:.3g} {unit} RMS that no effect explains; it depends on {s.variable}"
-    if when := s.when:
+    mostly = _mostly(robot, s.axis, s.where, s.when, recordings)
+    return Unexplained((name,), "; ".join([where, *mostly]), s.share, s.p_value)
+
+
+def _mostly(robot: Robot, axis: Axis, where: Where | None, when: When | None, recordings: Sequence[str]) -> list[str]:
+    """Where and when most of an error is, as far as that is told."""
+    out = []
+    if where:
+        place = views.range_of(robot, axis, where.begin, where.end)
+        out.append(f"{100 * where.share:.0f} % of the squared error is at a {place}")
+    if when:
         time = f"from {when.begin:.4g} to {when.end:.4g} s of {recordings[when.recording]}"
-        where += f"; {100 * when.share:.0f} % of the squared error is {time}"
-    return Unexplained((name,), where, s.share, s.p_value)
+        out.append(f"{100 * when.share:.0f} % of the squared error is {time}")
+    return out
+
+
+def _mostly_of_joint(of: Found, j: int) -> list[str]:
+    """Where and when most of what the corrected model leaves of a joint is."""
+    stretches, axis = of.ex.data.stretches, Axis("q", j)
+    left = [np.where(u, x, 0.0)[:, j] for u, x in zip(of.proof.use, of.proof.corrected, strict=True)]
+    when = shortest(stretches, left, j)
+    where = None if when else narrowest(stretches, left, axis)  # in a short time few positions are visited
+    return _mostly(of.data.robot, axis, where, when, of.data.names)
 
 
 def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     """All notes, what matters most first; `torque` is the size of the joints' torque, shape (n,)."""
     robot, judged = of.data.robot, of.proof.judged
     gap = None if of.beyond is None else native_gap(of.beyond, of.data.band)
-    lacking = list(dict.fromkeys(n.effect.title for n in of.model.named if n.effect.export.not_in_mjcf))
+    lacking = [(n.effect.title, n.joints) for n in of.model.named if n.effect.export.not_in_mjcf]
     channels = timing_notes(of.ex) if of.servo is None else [
         *motion_notes(robot, of.fit), *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo)]
-    open_joints = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing.values()]
+    open_joints = [f"{'; '.join([x[0].upper() + x[1:], *_mostly_of_joint(of, j)])}." for j, x in missing.items()]
     scatter, told = np.hypot(*of.sensors), {*missing, *(s.joint for s in (*of.rest, *of.slight))}
     return [
         *of.data.servo_notes, *link_encoder_notes(of.data, of.model, of.findings),
         *harmful_notes(robot, of.harmful), *open_joints,
         *rest_notes(robot, of.proof, scatter), *slight_notes(robot, of.slight),
-        *left_notes(robot, of.proof, scatter, torque, told),
+        *left_notes(robot, of.proof, scatter, torque, told, partial(_mostly_of_joint, of)),
         *unproved_notes(of.ex, of.seen, servo=of.servo is not None), *inertial_notes(of.ex, of.uncertainty),
         *friction_notes(of.ex, of.data.names, judged),
         *channels, *discrepancy_notes(of.ex, of.proof), *coarse_positions(robot, *of.sensors, judged), *of.data.notes,

@@ -1,6 +1,6 @@
 """What a person should know beside the verdict: repairs, assumptions, warnings, joints that were not judged."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
@@ -73,8 +73,9 @@ def rest_notes(robot: Robot, proof: HeldOut, scatter: np.ndarray) -> list[str]:
 
 
 def left_notes(
-    robot: Robot, proof: HeldOut, scatter: np.ndarray, torque: np.ndarray, told: Collection[int]
-) -> list[str]:
+    robot: Robot, proof: HeldOut, scatter: np.ndarray, torque: np.ndarray, told: Collection[int],
+    mostly: Callable[[int], Sequence[str]] = lambda _: (),
+) -> list[str]:  # fmt: skip
     """A note on joints whose error is more than the sensors' scatter, where nothing says what it depends on.
 
     Args:
@@ -83,11 +84,12 @@ def left_notes(
         scatter: Of the sensors, shape (n,) [N m or N].
         torque: Size of the joints' torque, shape (n,).
         told: Joints of which something else is said.
+        mostly: Where and when most of a joint's error is.
     """
     left = proof.rmse(proof.corrected)
     much = left > np.maximum(settings.MATERIAL_TORQUE * torque, settings.ABOVE_NOISE * scatter)
     said = [
-        _size(robot, int(j), left[j], left[j] / max(torque[j], 1e-300))
+        ", ".join([_size(robot, int(j), left[j], left[j] / max(torque[j], 1e-300)), *mostly(int(j))])
         for j in np.flatnonzero(proof.judged & much)
         if j not in told
     ]
@@ -95,7 +97,7 @@ def left_notes(
         return []
     return [
         "Not all of the torque is explained, and what the rest depends on was not found. While the joint "
-        f"moves, the corrected model leaves more than the noise of the sensors on unseen data: {', '.join(said)}."
+        f"moves, the corrected model leaves more than the noise of the sensors on unseen data: {'; '.join(said)}."
     ]
 
 
@@ -137,35 +139,43 @@ def unproved_notes(ex: Explanation, seen: Seen, *, servo: bool) -> list[str]:
     What is not testable is said to be that, and no more; but a simulation may tell what torque does not.
     """
     names, out = ex.lib.robot.joint_names, []
-    simulated = ", or simulations from the commands," if servo else ""
+    several = len(np.unique(ex.data.motions)) > 1
+    there = " on motions that the fit did not see" * several + ", or in simulations from the commands" * servo
     for slug, joints in (x for x in ex.unproved if servo or x not in seen or seen[x][0] >= settings.VISIBLE):
         title = ex.lib.effects[slug].title
         out.append(
             f"{title[0].upper()}{title[1:]} on {', '.join(names[j] for j in joints)} would fit the torque of these "
-            f"recordings, but motions that the fit did not see{simulated} speak against it: it is not named."
+            f"recordings, but the laws that are named err more with it{there}: it is not named."
         )
     return out
 
 
-def gap_notes(robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out: Sequence[str]) -> list[str]:
+def gap_notes(
+    robot: Robot, gap: np.ndarray | None, torque: np.ndarray, left_out: Sequence[tuple[str, tuple[int, ...]]]
+) -> list[str]:
     """A note for every joint at which `corrected.xml` gives another torque than the corrected model.
 
     Args:
         robot: The nominal model.
         gap: The difference, shape (n,), or None where it isn't known.
         torque: Size of the joints' torque, shape (n,).
-        left_out: Effects that MJCF can't hold, or not whole.
+        left_out: Titles and joints of effects that MJCF can't hold, or not whole.
     """
     if gap is None:
         return ["corrected.xml could not be compared with the corrected model: MuJoCo reads other joints from it."]
-    reason = f"the file can't hold all of {', '.join(left_out)}" if left_out else (
-        "a link of the given model has inertial parameters that no body can have, and the file keeps them")
+
+    def reason(j: int) -> str:
+        here = [title for title, joints in left_out if j in joints] or [title for title, _ in left_out]
+        if not here:
+            return "a link of the given model has inertial parameters that no body can have, and the file keeps them"
+        return f"the file can't hold all of {', '.join(dict.fromkeys(here))}"
+
     return [
-        f"On {name} the torque of corrected.xml differs from that of the corrected model by {g:.3g} "
-        f"{unit} RMS ({100 * g / t:.0f} % of the joint's torque): {reason}. To predict torque, use "
-        "`irb140 predict`."
-        for name, unit, g, t in zip(robot.joint_names, robot.torque_units, gap, torque, strict=True)
-        if g > settings.NOTABLE_GAP * t > 0.0
+        f"On {robot.joint_names[j]} the torque of corrected.xml differs from that of the corrected model by "
+        f"{gap[j]:.3g} {robot.torque_units[j]} RMS ({100 * gap[j] / torque[j]:.0f} % of the joint's torque): "
+        f"{reason(j)}. To predict torque, use `irb140 predict`."
+        for j in range(robot.n)
+        if gap[j] > settings.NOTABLE_GAP * torque[j] > 0.0
     ]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import signal
 
 from irb140_jax.mismatch.output.inertials import LinkShift
-from irb140_jax.mismatch.records import plain
+from irb140_jax.mismatch.records import digits, plain
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.explanation import Explanation
 from irb140_jax.mismatch.validation.competitors import Axis
@@ -223,12 +223,23 @@ def _along(s: Stretch, axis: Axis) -> np.ndarray:
 
 def _label(robot: Robot, axis: Axis) -> str:
     """What an axis shows, in words and with its unit."""
-    slide, name = robot.is_slide[axis.joint], robot.joint_names[axis.joint]
-    length = "m" if slide else "rad"
+    words, unit = _words_and_unit(robot, axis)
+    return f"{words} [{unit}]"
+
+
+def range_of(robot: Robot, axis: Axis, begin: float, end: float) -> str:
+    """A part of an axis in words."""
+    words, unit = _words_and_unit(robot, axis)
+    return f"{words} from {digits(begin)} to {digits(end)} {unit}"
+
+
+def _words_and_unit(robot: Robot, axis: Axis) -> tuple[str, str]:
+    name, torque = robot.joint_names[axis.joint], robot.torque_units[axis.joint]
+    length = "m" if robot.is_slide[axis.joint] else "rad"
     return {
-        "q": f"position of {name} [{length}]", "qd": f"speed of {name} [{length}/s]",
-        "qdd": f"acceleration of {name} [{length}/s²]", "nominal": f"load of {name} [{robot.torque_units[axis.joint]}]",
-        "tau": f"torque of {name} [{robot.torque_units[axis.joint]}]", "t": "time since the recording began [s]",
+        "q": (f"position of {name}", length), "qd": (f"speed of {name}", f"{length}/s"),
+        "qdd": (f"acceleration of {name}", f"{length}/s²"), "nominal": (f"load of {name}", torque),
+        "tau": (f"torque of {name}", torque), "t": ("time since the recording began", "s"),
     }[axis.quantity]  # fmt: skip
 
 

@@ -47,6 +47,7 @@ class Competitor(NamedTuple):
         features: Shape (R, F), of the order of one.
         fold: Which rows are left out together, shape (R,).
         shifts: Whether shifting time breaks what it could rightly predict, so that shifted copies make its null.
+        knows: How many variables it knows; time, with which goes whatever is slow, counts as all of them.
     """
 
     variable: str
@@ -54,6 +55,7 @@ class Competitor(NamedTuple):
     features: np.ndarray
     fold: np.ndarray
     shifts: bool
+    knows: int
 
 
 class Rows(NamedTuple):
@@ -95,30 +97,30 @@ def _unweighted(stretches: list[Stretch], j: int, rows: Rows, names: tuple[str, 
     mine = lambda x: x[:, [j]]  # noqa: E731
     along = _waves(mine(q))
     groups = {
-        "position": ("q", np.hstack([_features(mine(q)), along])),
-        "speed": ("qd", _features(mine(qd))),
-        "acceleration": ("qdd", _features(mine(qdd))),
-        "load": ("nominal", _features(mine(load))),
-        "position and speed": ("q", _features(np.hstack([mine(q), mine(qd)]))),
-        "position and its direction of motion": ("q", np.hstack([along, direction * along, direction])),
-        "load and speed": ("nominal", _features(np.hstack([mine(load), mine(qd)]))),
-        "own past": ("q", _memory(stretches, j, rows)),
+        "position": ("q", 1, np.hstack([_features(mine(q)), along])),
+        "speed": ("qd", 1, _features(mine(qd))),
+        "acceleration": ("qdd", 1, _features(mine(qdd))),
+        "load": ("nominal", 1, _features(mine(load))),
+        "position and speed": ("q", 2, _features(np.hstack([mine(q), mine(qd)]))),
+        "position and its direction of motion": ("q", 2, np.hstack([along, direction * along, direction])),
+        "load and speed": ("nominal", 2, _features(np.hstack([mine(load), mine(qd)]))),
+        "own past": ("q", 2, _memory(stretches, j, rows)),
     }
     fold, others = _motion_folds(stretches, rows), [i for i in range(len(names)) if i != j]
-    out = [Competitor(f"the joint's {name}", Axis(by, j), x, fold, True) for name, (by, x) in groups.items()]
+    out = [Competitor(f"the joint's {name}", Axis(by, j), x, fold, True, k) for name, (by, k, x) in groups.items()]
     # Not the joint's own logged torque: what is left is a part of it.
-    out += [Competitor(f"the torque of {names[i]}", Axis("tau", i), tau[:, [i]], fold, True) for i in others]
+    out += [Competitor(f"the torque of {names[i]}", Axis("tau", i), tau[:, [i]], fold, True, 1) for i in others]
     for i in others:
         by_direction = np.hstack([direction * _features(q[:, [i]]), direction])
         said = f"the position of {names[i]} and the joint's own direction of motion"
-        out.append(Competitor(said, Axis("q", i), by_direction, fold, True))
+        out.append(Competitor(said, Axis("q", i), by_direction, fold, True, 2))
     own = np.hstack([np.ones_like(direction), direction, *(mine(x) for x in (q, qd, load))])
     for i in others:
         theirs = np.stack([q[:, i], qd[:, i], np.abs(qd[:, i]), np.sign(qd[:, i]), qdd[:, i]], axis=1)
         products = (own[:, :, None] * theirs[:, None]).reshape(len(own), -1)
         waves = np.hstack([_features(np.hstack([mine(x), x[:, [i]]])) for x in (q, qd)])
         together = f"the motion of {names[i]} together with the joint's own"
-        out += [Competitor(together, Axis("qd", i), x, fold, True) for x in (products, waves)]
+        out += [Competitor(together, Axis("qd", i), x, fold, True, 3) for x in (products, waves)]
     return [*out, *_repeated(stretches, rows), _time(stretches, rows)]
 
 
@@ -189,7 +191,7 @@ def _repeated(stretches: list[Stretch], rows: Rows) -> list[Competitor]:
                 features[mine] += np.interp(at[mine], at[theirs], left[theirs]) / len(others)
     said = "time or on the motion, which repeats of it can't tell apart"
     known = (features / rows.level)[:, None]
-    return [Competitor(said, Axis("t", 0), known, rows.recording, False)] if features.any() else []
+    return [Competitor(said, Axis("t", 0), known, rows.recording, False, 4)] if features.any() else []
 
 
 def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
@@ -206,4 +208,5 @@ def _time(stretches: list[Stretch], rows: Rows) -> Competitor:
     for _, own in features:
         phi[row : row + len(own), column : column + own.shape[1]] = own
         row, column = row + len(own), column + own.shape[1]
-    return Competitor("time more than on the motion", Axis("t", 0), phi, np.concatenate(folds), False)
+    said = "time or on the motion of more than two joints"
+    return Competitor(said, Axis("t", 0), phi, np.concatenate(folds), False, 4)

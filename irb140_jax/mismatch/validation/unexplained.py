@@ -40,6 +40,19 @@ class When(NamedTuple):
     of_torque: float
 
 
+class Where(NamedTuple):
+    """A short part of what was visited of a position, a speed or a load that holds most of what is left.
+
+    Attributes:
+        begin, end: Of the variable.
+        share: Of the squared residual of all recordings.
+    """
+
+    begin: float
+    end: float
+    share: float
+
+
 @dataclasses.dataclass(frozen=True)
 class Structure:
     """What is left at one joint.
@@ -53,6 +66,7 @@ class Structure:
         of_torque: The same over the joint's torque, root mean squares.
         axis: One of them, to draw what is left over it.
         when: Where it is that short.
+        where: Along the axis, where that is not time and it is that short.
     """
 
     joint: int
@@ -63,6 +77,7 @@ class Structure:
     of_torque: float
     axis: Axis
     when: When | None = None
+    where: Where | None = None
 
 
 def unexplained(ex: Explanation, proof: HeldOut, scatter: np.ndarray) -> tuple[list[Structure], list[Structure]]:
@@ -111,16 +126,19 @@ def _beyond_chance(
     if shares.max() < least:
         return []
     null, both = _null(rivals, rows), zip(ex.data.stretches, proof.left, strict=True)
-    when = shortest(ex.data.stretches, [np.where(s.use, r, 0.0)[:, j] for s, r in both], j)
+    left = [np.where(s.use, r, 0.0)[:, j] for s, r in both]
+    when = shortest(ex.data.stretches, left, j)
     out = []
     # Along a slow sweep position goes with time, and so do copies of the residual shifted in time: where motion is not
     # beyond chance, what goes with time still is.
-    for best in dict.fromkeys((_carrier(rivals, shares), int(np.argmax(shares)))):
+    for best in dict.fromkeys((carrier(rivals, shares), int(np.argmax(shares)))):
         share, size = float(shares[best]), float(np.sqrt(max(shares[best], 0.0))) * rmse
         p = float((1 + np.sum(null >= share)) / (1 + SHIFTS))
         if p <= settings.SIGNIFICANT:
             part = size / max(torque, 1e-300)
-            out.append(Structure(j, share, p, rivals[best].variable, size, part, rivals[best].axis, when))
+            axis = rivals[best].axis
+            where = narrowest(ex.data.stretches, left, axis)
+            out.append(Structure(j, share, p, rivals[best].variable, size, part, axis, when, where))
     return out
 
 
@@ -136,26 +154,62 @@ def shortest(stretches: list[Stretch], residuals: list[np.ndarray], j: int) -> W
     recorded = sum(float(s.t[-1] - s.t[0]) for s in stretches)
     best, least = None, settings.BRIEF * recorded
     for s, r in zip(stretches, residuals, strict=True):
-        so_far = np.append(0.0, np.cumsum(r**2))
-        end = np.searchsorted(so_far, so_far[:-1] + settings.MOST_OF_ERROR * total)
-        first = np.flatnonzero(end < len(so_far))
-        lasts = s.t[end[first] - 1] - s.t[first]
-        if len(first) and np.min(lasts) < least:
-            i = int(first[np.argmin(lasts)])
-            error, counts = so_far[end[i]] - so_far[i], r[i : end[i]] != 0.0
-            of_torque = float(np.sqrt(error / max(float(np.sum(s.tau[i : end[i], j][counts] ** 2)), 1e-300)))
-            best = When(s.recording, float(s.t[i]), float(s.t[end[i] - 1]), float(error / total), of_torque)
-            least = float(np.min(lasts))
+        held = _holds_most(s.t, r, total)
+        if held is None or (lasts := s.t[held.stop - 1] - s.t[held.start]) >= least:
+            continue
+        error, counts = float(np.sum(r[held] ** 2)), r[held] != 0.0
+        of_torque = float(np.sqrt(error / max(float(np.sum(s.tau[held, j][counts] ** 2)), 1e-300)))
+        best = When(s.recording, float(s.t[held.start]), float(s.t[held.stop - 1]), error / total, of_torque)
+        least = float(lasts)
     return best
 
 
-def _carrier(rivals: list[Competitor], shares: np.ndarray) -> int:
-    """The best competitor; time only where motion does not do nearly as well.
+def narrowest(stretches: list[Stretch], residuals: list[np.ndarray], axis: Axis) -> Where | None:
+    """The narrowest part of a variable that holds `MOST_OF_ERROR` of the square of residuals.
 
-    Whatever is slow goes with time, and all but noise comes back in the repeats of a motion.
+    None where it is not `BRIEF`, as a share of what was visited, and along time.
+
+    Args:
+        stretches: Rows of all recordings.
+        residuals: Of each [N m or N], shape (R,), zero in rows that don't count.
+        axis: The variable.
+    """
+    if axis.quantity == "t":
+        return None
+    r = np.concatenate(residuals)
+    x = np.concatenate([getattr(s, axis.quantity)[:, axis.joint] for s in stretches])[r != 0.0]
+    order = np.argsort(x)
+    x, r = x[order], r[r != 0.0][order]
+    total = float(np.sum(r**2))
+    held = _holds_most(x, r, total)
+    if held is None or x[held.stop - 1] - x[held.start] >= settings.BRIEF * np.ptp(x):
+        return None
+    return Where(float(x[held.start]), float(x[held.stop - 1]), float(np.sum(r[held] ** 2)) / total)
+
+
+def _holds_most(x: np.ndarray, r: np.ndarray, total: float) -> slice | None:
+    """Rows of the narrowest part of a rising variable that hold `MOST_OF_ERROR` of a total of squares; None if none do.
+    """
+    so_far = np.append(0.0, np.cumsum(r**2))
+    end = np.searchsorted(so_far, so_far[:-1] + settings.MOST_OF_ERROR * total)
+    first = np.flatnonzero(end < len(so_far))
+    if not len(first):
+        return None
+    i = int(first[np.argmin(x[end[first] - 1] - x[first])])
+    return slice(i, int(end[i]))
+
+
+def carrier(rivals: list[Competitor], shares: np.ndarray) -> int:
+    """The simplest of the competitors that predict about as much as the best; time only where motion does not nearly.
+
+    Whatever is slow goes with time, and all but noise comes back in the repeats of a motion.  Along one path every
+    joint goes with every other, so that those who know more joints predict a little more by chance.
     """
     motion = np.where([c.shifts for c in rivals], shares, -np.inf)
-    return int(np.argmax(motion if motion.max() > settings.NEARLY * shares.max() else shares))
+    if motion.max() <= settings.NEARLY * shares.max():
+        return int(np.argmax(shares))
+    enough = np.flatnonzero(motion >= settings.MOST_OF_ERROR * motion.max())
+    return int(min(enough, key=lambda k: (rivals[k].knows, -shares[k])))
 
 
 def _rows(ex: Explanation, proof: HeldOut, j: int) -> Rows:
