@@ -9,12 +9,14 @@ from helpers_recordings import motion, recording, robot
 
 from irb140_jax.effects.catalogue import CATALOGUE
 from irb140_jax.effects.left_over import LeftOver
+from irb140_jax.mismatch.columns.along import all_prepared
 from irb140_jax.mismatch.output.findings import findings
 from irb140_jax.mismatch.regression.assemble import Data
 from irb140_jax.mismatch.regression.gram import JointGram
+from irb140_jax.mismatch.regression.rows import with_candidates
 from irb140_jax.mismatch.regression.sensor_noise import scatter_by_sensor
-from irb140_jax.mismatch.selection.explain import explain
-from irb140_jax.mismatch.selection.explanation import Explanation
+from irb140_jax.mismatch.selection.explain import _by_block, explain
+from irb140_jax.mismatch.selection.explanation import Explanation, usual_in_its_place
 from irb140_jax.mismatch.selection.selected import noise_left
 from irb140_jax.mismatch.validation import held_out as proof_module
 from irb140_jax.mismatch.validation.held_out import (
@@ -121,6 +123,38 @@ def test_a_rare_effect_that_other_motions_contradict_is_not_proved():
     assert unproved(contradicted(ex, rotor, 0)) == [("rotor_inertia", (1,))]
     assert {slug for slug, _ in unproved(contradicted(ex, usual, 0))} <= {"rotor_inertia"}
     assert unproved(dataclasses.replace(contradicted(ex, rotor, 0), data=of_one_recording(ex))) == []
+
+
+def test_a_single_motion_speaks_against_what_makes_its_own_error_larger():
+    arm, log = robot(pendulum=True), recording(seed=4, pendulum=True)
+    logs = [dataclasses.replace(log, tau=log.tau + 3.0 * (log.q - 0.2))]
+    band = choose_band(logs, arm)
+    smooth = [condition(r, band) for r in logs]
+    effects = (*FRICTION, CATALOGUE["gravity_spring"])
+    ex = explain(arm, smooth, band, effects, 0.05, np.hypot(*scatter_by_sensor(arm, logs, smooth, band)))
+    (spring,) = [i for i, m in zip(ex.chosen, ex.members, strict=True) if m.slug == "gravity_spring"]
+    assert unproved(ex) == []
+    assert unproved(contradicted(ex, spring, 0)) == [("gravity_spring", (0,))]
+
+
+def test_friction_of_a_special_form_has_to_do_better_than_ordinary_friction_in_its_place():
+    """Friction that is the same both ways, given two levels: on unseen motions one level does as well."""
+    arm, logs = robot(), [recording(seed=seed) for seed in (4, 5, 6)]
+    band = choose_band(logs, arm)
+    smooth = [condition(log, band) for log in logs]
+    effects = (*FRICTION, CATALOGUE["asymmetric_friction"])
+    sensors = np.hypot(*scatter_by_sensor(arm, logs, smooth, band))
+    ex = explain(arm, smooth, band, effects, 0.05, sensors)
+    dry = next(i for i, m in zip(ex.chosen, ex.members, strict=True) if m.slug == "coulomb_friction")
+    joints = ex.data.candidates[dry].joints
+    other = next(i for i, c in enumerate(ex.data.candidates) if c.slug == "asymmetric_friction" and c.joints == joints)
+    assert usual_in_its_place(ex.data.candidates, (other,), other)[0] == dry
+    given = dataclasses.replace(ex, chosen=tuple(sorted(set(ex.chosen) - {dry} | {other})))
+    members = [ex.data.candidates[i] for i in (*given.chosen, dry)]
+    along = all_prepared(arm, smooth)
+    rows = [with_candidates(s, members, r, band, None, None) for s, r in zip(ex.data.stretches, along, strict=True)]
+    given = _by_block(dataclasses.replace(given, data=dataclasses.replace(ex.data, stretches=rows)), sensors)
+    assert unproved(given) == [("asymmetric_friction", joints)]
 
 
 def test_a_finding_is_judged_beside_inertials_that_may_be_as_far_off_without_it(alike, monkeypatch):

@@ -87,9 +87,11 @@ def test_ordinary_friction_is_stated_where_one_rare_effect_explains_nearly_as_mu
     """A wrong torque constant and a discrepancy like friction may be nearly as probable as friction itself."""
     space, _ = planted(2, {})
     friction, offset, rotor = (0, 1), (2,), (0, 3)
-    stated = lambda best, other: named(space.candidates, {frozenset(best): 0.0, frozenset(other): -1.9})  # noqa: E731
+    stated = lambda best, other, by=1.9: named(space.candidates, {frozenset(best): by, frozenset(other): 0.0})  # noqa: E731
     assert stated(friction, offset) == friction and stated(offset, friction) == friction
-    assert stated(rotor, offset) == offset and stated(offset, rotor) == offset  # one rare effect each
+    # One rare effect each: that with fewer members, unless the other is three times as probable.
+    assert stated(rotor, offset, 0.9) == offset and stated(offset, rotor) == offset
+    assert stated(rotor, offset) == rotor
 
 
 def test_a_scale_of_all_torques_counts_as_a_member_that_few_robots_have():

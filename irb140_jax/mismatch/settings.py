@@ -86,6 +86,8 @@ LEAST_MASS = 1e-3
 # Posterior probability, with that of what may stand in its place, from which an effect is named: odds of ten, "strong"
 # evidence in Jeffreys, Theory of Probability, 1961, app. B.
 NAMED = 0.9
+# [nats] of odds of three, the root of those: "substantial" there.  Who has as much against it is not named.
+SUBSTANTIAL = 0.5 * float(np.log(NAMED / (1.0 - NAMED)))
 # [nats] of the best set, within which sets are averaged: others weigh less than one in a million.
 WITHIN = 15.0
 # Relative change of the noise from round to round below which shapes are fine enough.
@@ -101,7 +103,8 @@ CLEARLY_BETTER = float(np.log(100.0))
 # Share of what is left that must be predictable, and share of the joint's torque: less is not worth a person's time,
 # and smoothing and imperfect laws leave as much.
 MATERIAL_SHARE, MATERIAL_TORQUE = 0.05, 0.02
-# Share of its square that a short time must hold to be told, and share of all recorded time that is short.
+# Most of what is left: share of its square that a short time or part of a range must hold to be told, and of what the
+# best competitor predicts that a simpler one must reach.  And share of all recorded time or of a range that is short.
 MOST_OF_ERROR, BRIEF = 0.8, 0.2
 # Of what a joint travels, by which a stop at its end gives way.
 STOP_GIVES = 0.01

@@ -28,6 +28,12 @@ class Data:
     candidates: tuple[Candidate, ...]
     nuisances: int
 
+    @property
+    def motions(self) -> np.ndarray:
+        """Which motion each stretch is of, shape (stretches,): repeats of one have its number, others are on their own.
+        """
+        return np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in self.stretches])
+
 
 def judged(stretches: list[Stretch]) -> list[Stretch]:
     """The rows, with none of joints of which too few tell."""

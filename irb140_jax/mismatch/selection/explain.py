@@ -31,7 +31,7 @@ from irb140_jax.mismatch.regression.sums import summed
 from irb140_jax.mismatch.regression.tangent import Point, point
 from irb140_jax.mismatch.selection.averages import Site, site_of
 from irb140_jax.mismatch.selection.evidence import Hyper, Space
-from irb140_jax.mismatch.selection.explanation import Explanation, fitted
+from irb140_jax.mismatch.selection.explanation import Explanation, fitted, usual_in_its_place
 from irb140_jax.mismatch.selection.falling_friction import with_falling_friction
 from irb140_jax.mismatch.selection.finer_shapes import is_coarse, nearest_shape, refined
 from irb140_jax.mismatch.selection.hyperparameters import settled
@@ -280,7 +280,7 @@ def _explained(given: _Given, start: _Start) -> tuple[Explanation, bool]:
     for joint in space.joints:
         joint.forget()
     left_open = _rotors_open(space, data, found, found_hyper) if last and given.drive is not None else ()
-    members = [data.candidates[i] for i in (*found, *left_open)]
+    members = [data.candidates[i] for i in (*found, *left_open, *_in_place(data, found))]
     held = [with_candidates(s, members, r, given.band, load, at)
             for s, (r, load) in zip(data.stretches, regression.each, strict=True)]  # fmt: skip
     ex = Explanation(
@@ -300,6 +300,12 @@ def _rotors_open(space: Space, data: Data, found: tuple[int, ...], hyper: Hyper)
     rotors = [i for i, c in enumerate(data.candidates) if c.effect is ROTOR and c.joints not in named]
     probable = special.expit(gains(space, found, hyper, np.array(rotors, dtype=int))) > settings.LISTED_PROBABILITY
     return tuple(i for i, possible in zip(rotors, probable, strict=True) if possible)
+
+
+def _in_place(data: Data, chosen: Sequence[int]) -> list[int]:
+    """Ordinary friction that may stand in the place of what a set has."""
+    each = [usual_in_its_place(data.candidates, chosen, i) for i in chosen]
+    return sorted({i for usual in each for i in usual})
 
 
 def _sites(data: Data, chosen: Sequence[int]) -> set[Site]:
@@ -364,8 +370,11 @@ def _first_noise(
 
 
 def _by_block(ex: Explanation, sensors: np.ndarray) -> Explanation:
-    """The explanation with Gram matrices of what it names or leaves open by block of the data, to leave some out."""
-    columns = ex.columns((*ex.chosen, *ex.open_rotors))
+    """The explanation with Gram matrices by block of the data, to leave some out.
+
+    Of what it names or leaves open, and of what may stand in the place of that.
+    """
+    columns = ex.columns((*ex.chosen, *ex.open_rotors, *_in_place(ex.data, ex.chosen)))
     joints = grams_by_block(ex.data, ex.extra, ex.noise, sensors, columns, settings.BLOCKS)
     return dataclasses.replace(ex, by_block=dataclasses.replace(ex.space, joints=joints))
 

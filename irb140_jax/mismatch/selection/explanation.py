@@ -329,11 +329,7 @@ class Explanation:
         best = lambda sets, there: max((x for s, x in sets.items() if bool(s & here) == there), default=-np.inf)  # noqa: E731
         if (judge := self.judged_by(index)) is not self:  # with the same candidates: both searched one library
             return best(judge.sets, True) - best(judge.sets, False)
-        options = [rest]
-        if c.effect.place.is_friction and not c.effect.prior.ordinary:
-            taken = {site_of(m) for m in self.members}
-            usual = [i for i, o in enumerate(every) if o.effect.prior.ordinary and o.joints == c.joints]
-            options.append((*rest, *(i for i in usual if site_of(every[i]) not in taken)))
+        options = {rest, (*rest, *usual_in_its_place(every, self.chosen, index))}
         joints = list(self.space.reach(index))
         without = max(self.log_posterior(o, joints) for o in options)
         if not np.isfinite(without):
@@ -370,6 +366,21 @@ class Explanation:
     def judged_by(self, index: int) -> "Explanation":
         """The explanation whose slopes say something of sets without a chosen candidate."""
         return self.nominal if self.nominal and site_of(self.averaged_over[index]) in self.rests_on else self
+
+
+def usual_in_its_place(candidates: Sequence[Candidate], chosen: Sequence[int], index: int) -> tuple[int, ...]:
+    """Ordinary friction that a set lacks where it has friction that is not: what may be there in its place.
+
+    Args:
+        candidates: What may be in a set.
+        chosen: The set.
+        index: Which of it.
+    """
+    c, taken = candidates[index], {site_of(candidates[i]) for i in chosen}
+    if not c.effect.place.is_friction or c.effect.prior.ordinary:
+        return ()
+    usual = [i for i, o in enumerate(candidates) if o.effect.prior.ordinary and o.joints == c.joints]
+    return tuple(i for i in usual if site_of(candidates[i]) not in taken)
 
 
 def parts(data: Data, chosen: tuple[int, ...]) -> list[slice]:

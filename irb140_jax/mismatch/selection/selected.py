@@ -41,19 +41,22 @@ def selected(
 def named(candidates: Sequence[Candidate], sets: Sets) -> tuple[int, ...]:
     """What is stated: the members of a set that are probable together with what may stand in their place.
 
-    Of sets that can't be told from the best one it is that with the fewest members beside ordinary friction, and of
-    those that with the fewest in all: two names for what may be one need the odds for it, ordinary friction needs none.
+    Of sets that can't be told from the best one it is one with the fewest members beside ordinary friction: a rare
+    effect needs the odds for it, ordinary friction needs none.  Of those it is that with the fewest in all, where
+    evidence for more is not substantial.
 
     Args:
         candidates: What may be in a set.
         sets: Log posterior of every set visited.
     """
-    top = max(sets, key=lambda s: sets[s])
-    least = sets[top] - np.log(settings.NAMED / (1.0 - settings.NAMED))
+    top, odds = max(sets, key=lambda s: sets[s]), np.log(settings.NAMED / (1.0 - settings.NAMED))
     # Whether one of its own members may be missing is for that member's probability to say.
-    even = [s for s, value in sets.items() if value > least and not s < top]
+    even = [s for s, value in sets.items() if value > sets[top] - odds and not s < top]
     beside = lambda s: sum(not candidates[i].effect.prior.ordinary for i in s)  # noqa: E731
-    few = tuple(sorted(min(even, key=lambda s: (beside(s), len(s), -sets[s]))))
+    fewest = min(map(beside, even))
+    rare = [s for s in even if beside(s) == fewest]
+    least = max(sets[s] for s in rare) - settings.SUBSTANTIAL
+    few = tuple(sorted(min((s for s in rare if sets[s] > least), key=lambda s: (len(s), -sets[s]))))
     return tuple(i for i in few if in_its_place(candidates, sets, few, i)[1] >= settings.NAMED)
 
 

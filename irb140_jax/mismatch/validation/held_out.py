@@ -1,7 +1,6 @@
 """Does it hold on data that the fit did not see?  Motions, or blocks of a single one, are left out in turn."""
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from irb140_jax.mismatch.regression.noise import Noise, noise_from_residuals
 from irb140_jax.mismatch.regression.nuisances import DRIVE, Nuisances
 from irb140_jax.mismatch.regression.rows import Stretch
 from irb140_jax.mismatch.selection.averages import Site, site_of
-from irb140_jax.mismatch.selection.explanation import Explanation, parts
+from irb140_jax.mismatch.selection.explanation import Explanation, parts, usual_in_its_place
 
 SETTLED = 2  # rounds in which the noise and what leaves it agree
 
@@ -90,16 +89,19 @@ def folds(ex: Explanation) -> list[np.ndarray]:
     A motion that all but alone moves some joint, or all but alone holds what a finding does, is left out block by
     block, too: without it nothing is known there, and a wall that is touched once would drown all else.
     """
-    recording = recordings_of_blocks(ex)
     out, weight = [], np.vstack([np.stack([g.rows for g in ex.by_block.joints]), _energy(ex, ex.chosen)])
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
-    of_recording = np.array([s.motion if s.motion >= 0 else -1 - s.recording for s in ex.data.stretches])
-    motion, number = of_recording[recording], np.tile(np.arange(settings.BLOCKS), len(ex.data.stretches))
-    for m in dict.fromkeys(motion.tolist()):
-        mine = motion == m
+    number = np.tile(np.arange(settings.BLOCKS), len(ex.data.stretches))
+    for mine in _motions(ex):
         alone = np.max(weight[:, mine].sum(axis=1)) > settings.ALONE
         out += [mine & (number == k) for k in np.unique(number[mine])] if alone else [mine]
     return out
+
+
+def _motions(ex: Explanation) -> list[np.ndarray]:
+    """Blocks of each motion, with all that repeat it, shape (blocks,) each."""
+    motion = ex.data.motions[recordings_of_blocks(ex)]
+    return [motion == m for m in dict.fromkeys(motion.tolist())]
 
 
 def recordings_of_blocks(ex: Explanation) -> np.ndarray:
@@ -231,28 +233,26 @@ def held_out_gains(ex: Explanation) -> dict[int, float]:
     Of all joints together, over the error of the set without it.  Its noise is that of the whole set, so that inertials
     then go as far from what is stated as they have to: much further than those of `Refit`.
     """
-    both = {i: (w.sum(), o.sum()) for i, (w, o) in _with_and_without(ex, ex.chosen, folds(ex)).items()}
-    return {i: float((without - whole) / max(without, 1e-300)) for i, (whole, without) in both.items()}
+    errors, out = _Errors(ex, folds(ex)), {}
+    for i in ex.chosen:
+        whole, without = (x.sum() for x in errors.with_and_without(i))
+        out[i] = float((without - whole) / max(without, 1e-300))
+    return out
 
 
 def unproved(ex: Explanation) -> list[Site]:
-    """The rare effect against which unseen data speak most, if they do so with the odds of a name.
+    """The rare effect against which motions speak most, if what they say is substantial.
 
     Evidence trusts that some law is true.  Where none of them knows what the model errs by, one may fit all the same,
     and motions that the fit did not see tell: by how many nats they are less probable with it, each joint's error as
-    large as it is there, and with what it says nothing of.  Blocks of one motion are no other motion: where there are
-    no others, nothing is taken away.
+    large as it is there, and with what it says nothing of.  Of a single motion, and of a finding that one motion alone
+    tells of, the same is asked of what the fit saw: a law that is only wanted for what it undoes of the discrepancy
+    makes the error larger there, too.
     """
-    left_out, recording = folds(ex), recordings_of_blocks(ex)
-    if all(np.isin(recording[~fold], recording[fold]).any() for fold in left_out):
-        return []
-    rows = np.array([float(g.rows.sum()) for g in ex.by_block.joints])
-    rare, against = [i for i in ex.chosen if _is_rare(ex, i)], {}
-    for i, (whole, without) in _with_and_without(ex, rare, left_out).items():
-        against[i] = 0.5 * float(np.sum(rows * np.log((whole + 1e-300) / (without + 1e-300))))
-        against[i] += float(ex.space.lost([i], ex.hyper)[0])
-    most, worst = np.log(settings.NAMED / (1.0 - settings.NAMED)), sorted(against, key=lambda i: -against[i])[:1]
-    return [site_of(ex.data.candidates[i]) for i in worst if against[i] > most]
+    errors = _Errors(ex, _motions(ex))
+    against = {i: errors.against(i) for i in ex.chosen if _is_rare(ex, i)}
+    worst = sorted(against, key=lambda i: -against[i])[:1]
+    return [site_of(ex.data.candidates[i]) for i in worst if against[i] > settings.SUBSTANTIAL]
 
 
 def _is_rare(ex: Explanation, index: int) -> bool:
@@ -261,37 +261,59 @@ def _is_rare(ex: Explanation, index: int) -> bool:
     return not (c.effect.prior.ordinary or c.is_inertials or index in ex.falls)
 
 
-def _with_and_without(
-    ex: Explanation, which: Sequence[int], left_out: list[np.ndarray]
-) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Whitened squared error on data that the fit did not see, with a finding and without it, by joint, (n,) each.
+@dataclasses.dataclass(frozen=True)
+class _Errors:
+    """Errors on data that the fit did not see, with what is found and without some of it.
 
-    Inertials may be as far off in both as they have to be without it: else what differs is how well they stand in for
-    anything, and not what the finding says.
+    Attributes:
+        ex: The explanation.
+        left_out: Blocks that are left out together.
+        whole: Errors with all that is found, by the explanation that judges and the inertials' width: filled as asked.
     """
-    whole: dict[tuple[bool, float], np.ndarray] = {}
-    out = {}
-    for i in which:
-        judge, site = ex.judged_by(i), site_of(ex.data.candidates[i])
-        fewer = judge.others(next(k for k in judge.chosen if site_of(judge.data.candidates[k]) == site))
-        key = judge is ex, judge.space.width(fewer, judge.hyper)
-        if key not in whole:
-            whole[key] = _unseen_errors(judge, judge.chosen, left_out, key[1])
-        out[i] = whole[key], _unseen_errors(judge, fewer, left_out, key[1])
-    return out
+
+    ex: Explanation
+    left_out: list[np.ndarray]
+    whole: dict[tuple[bool, float], np.ndarray] = dataclasses.field(default_factory=dict)
+
+    def with_and_without(self, index: int, instead: tuple[int, ...] = ()) -> tuple[np.ndarray, np.ndarray]:
+        """Whitened squared error by joint with a finding, and with others or nothing in its place, (n,) each.
+
+        Inertials may be as far off in both as they have to be without it: else what differs is how well they stand in
+        for anything, and not what the finding says.
+        """
+        judge, site = self.ex.judged_by(index), site_of(self.ex.data.candidates[index])
+        fewer = judge.others(next(k for k in judge.chosen if site_of(judge.data.candidates[k]) == site)) + instead
+        key = judge is self.ex, judge.space.width(fewer, judge.hyper)
+        if key not in self.whole:
+            self.whole[key] = _unseen_errors(judge, judge.chosen, self.left_out, key[1])
+        return self.whole[key], _unseen_errors(judge, fewer, self.left_out, key[1])
+
+    def against(self, index: int) -> float:
+        """By how many nats data are less probable with a finding than without it, or with usual friction in its place.
+        """
+        rows = np.array([float(g.rows.sum()) for g in self.ex.by_block.joints])
+        nats = []
+        for usual in {(), usual_in_its_place(self.ex.data.candidates, self.ex.chosen, index)}:
+            whole, without = self.with_and_without(index, usual)
+            nats.append(0.5 * float(np.sum(rows * np.log((whole + 1e-300) / (without + 1e-300)))))
+        return max(nats) + float(self.ex.space.lost([index], self.ex.hyper)[0])
 
 
 def _unseen_errors(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray], width: float) -> np.ndarray:
-    """Whitened squared error of a set on data that its fit did not see, by joint, shape (n,); see `posterior`."""
+    """Whitened squared error of a set on data that its fit did not see, by joint, shape (n,); see `posterior`.
+
+    What is left out with nothing beside it is seen.
+    """
     space, energy = ex.by_block, _energy(ex, chosen)
     error, columns = np.zeros(len(space.joints)), space.with_y(space.set_columns(chosen))
     seen = ex.posterior(chosen, instrument=False, width=width).mean
     for fold in left_out:
+        unseen = None if fold.all() else fold
         only = _only_here(ex, chosen, energy, fold)
-        mean = np.where(only, seen, ex.posterior(chosen, fold, instrument=False, width=width).mean)
+        mean = np.where(only, seen, ex.posterior(chosen, unseen, instrument=False, width=width).mean)
         w = np.zeros(len(columns))
         w[: space.inertials], w[space.offset : -1], w[-1] = mean[: space.inertials], mean[space.inertials :], -1.0
-        seen_by = space.without(fold)
+        seen_by = space if unseen is None else space.without(unseen)
         for j, (g, place) in enumerate(zip(space.joints, space.places, strict=True)):
             at, drive = place[columns], np.flatnonzero(g.groups == DRIVE)
             own = seen_by.own(j, ex.hyper[j], columns[:-1], w[:-1], instrument=False)[drive]
