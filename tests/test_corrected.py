@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import json
+import re
 
 import equinox as eqx
 import helpers_recordings
@@ -277,6 +278,13 @@ def test_how_far_the_written_file_is_off_is_what_impossible_inertials_lose():
     (note, *_) = gap_notes(arm(), gap, size, [])
     assert "inertial parameters that no body can have" in note and f"{gap[0]:.3g} N m" in note
     assert not gap_notes(arm(), 0.001 * size, size, [])
+
+
+def test_each_joint_is_told_what_the_file_lacks_of_its_own_and_else_of_others():
+    told = lambda *left_out: [re.findall(r"hold all of ([^:.]*)\.", note)[0]  # noqa: E731
+                              for note in gap_notes(arm(), np.ones(arm().n), np.ones(arm().n), left_out)]  # fmt: skip
+    assert told(("hysteresis", (0,)), ("ripple", (0, 1))) == ["hysteresis, ripple", "ripple"]
+    assert told(("hysteresis", (0,))) == ["hysteresis", "hysteresis"]
 
 
 def test_the_model_survives_its_way_through_json():

@@ -115,7 +115,8 @@ def test_errors_while_a_joint_moves_are_told_where_most_of_the_error_is_at_rest(
 def test_more_than_noise_that_depends_on_nothing_known_is_told(size, scatter, elsewhere, told):
     rows = [np.full((100, 1), True)]
     some = dataclasses.replace(proof(1.0, 100), corrected=[np.ones((100, 1))], recorded=rows, use=rows)
-    notes = left_notes(made.robot(pendulum=True), some, np.array([scatter]), np.array([size]), elsewhere)
+    when = lambda j: [f"mostly from {j} to 2 s"]  # noqa: E731
+    notes = left_notes(made.robot(pendulum=True), some, np.array([scatter]), np.array([size]), elsewhere, when)
     assert len(notes) == told
     if told:
-        assert "hinge 1 N m RMS (10 % of its torque)" in notes[0]
+        assert "hinge 1 N m RMS (10 % of its torque), mostly from 0 to 2 s" in notes[0]

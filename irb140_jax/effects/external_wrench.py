@@ -82,8 +82,9 @@ def _proposal(left, scales, joints):
 
 
 def _alike(left, w, shape):
+    # Each by itself: how far a force and a moment may stand in for each other is in their intervals.
     unfelt = []
-    for columns in (slice(0, 3), slice(3, 6)):  # a force and a moment that together do nothing stay within intervals
+    for columns in (slice(0, 3), slice(3, 6)):
         _, size, axes = np.linalg.svd(left.tool_jacobian[..., columns].reshape(-1, 3), full_matrices=False)
         for axis in axes[size < UNFELT * max(size[0], 1e-300)] * np.linalg.norm(w[columns]):
             unfelt.append(np.zeros(6))

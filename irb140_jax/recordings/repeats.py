@@ -28,14 +28,14 @@ def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], li
     out = sorted(kept.values(), key=lambda r: -len(r.t))
     for whole in list(out):
         if any(r is whole for r in out) and len(out) > 1:
-            holds = rows_of(whole)
+            holds = _part_of(whole)
             for r in [r for r in out if r is not whole and len(r.t) <= len(whole.t) and holds(r)]:
                 out = [x for x in out if x is not r]
                 notes.append(f"{r.source} holds a part of the log in {whole.source} and was left out.")
     return [r for r in kept.values() if any(r is x for x in out)], notes
 
 
-def rows_of(whole: Recording) -> Callable[[Recording], bool]:
+def _part_of(whole: Recording) -> Callable[[Recording], bool]:
     """Whether the rows of another recording are rows of this, cut out, thinned or rounded: sensors never repeat theirs.
     """
     there = _numbers(whole)
