@@ -6,6 +6,7 @@
 import collections
 import pathlib
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jinja2
@@ -52,6 +53,9 @@ def figures(lines: Lines) -> Rows:
         *((f"{100 * level:.0f} % intervals that hold the truth",
            counted([covered(v, s, true, level) for *_, v, s, true in found]),
            "85 to 95 %" if level == 0.9 else "") for level in LEVELS),
+        ("90 % intervals that hold the truth, of joints with structure that no effect explains",
+         counted([covered(v, s, true, 0.9) for *_, v, s, true in of(partial(scoring.intervals, unexplained=True))]),
+         ""),
         *_about_classes([c for c in classes if c["slug"]]),
         ("torque constants named within 5 %", counted(of(scoring.gains)), ""),
         *_about_noise("stated noise over the torque sensors'", of(scoring.floors), "all"),

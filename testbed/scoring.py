@@ -42,10 +42,17 @@ def probabilities(line: dict[str, Any]) -> list[tuple[str, float, bool]]:
     return [(f["effect"], float(f["evidence"]["probability"]), id(f) not in wrong) for f in found]
 
 
-def intervals(line: dict[str, Any]) -> list[tuple[str, str, float, float, float]]:
-    """Effect, parameter, value, standard deviation and truth of all that is named and known in the same meaning."""
-    out = []
+def intervals(line: dict[str, Any], *, unexplained: bool = False) -> list[tuple[str, str, float, float, float]]:
+    """Effect, parameter, value, standard deviation and truth of all that is named and known in the same meaning.
+
+    Args:
+        line: A stored result.
+        unexplained: Only of joints on which there is structure that no effect explains.
+    """
+    out, left = [], {joint for u in line["diagnosis"]["unexplained"] for joint in u["joints"]}
     for f in line["diagnosis"]["findings"]:
+        if unexplained and not left & set(f["joints"]):
+            continue
         for h in line["truth"]["hidden"]:
             same = f["effect"] == h["slug"] and (f["effect"] in EVERYWHERE or set(f["joints"]) == set(h["joints"]))
             for name, true in h["parameters"].items() if same else ():

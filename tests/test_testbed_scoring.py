@@ -29,6 +29,9 @@ def test_intervals_are_those_of_the_same_name_at_the_same_joint():
     truth = [hidden("coulomb_friction", "a", coulomb=2.0)]
     said = [finding("coulomb_friction", "a", coulomb=(2.1, 0.1)), finding("coulomb_friction", "b", coulomb=(9.0, 0.1))]
     assert scoring.intervals(line(said, truth)) == [("coulomb_friction", "coulomb", 2.1, 0.1, 2.0)]
+    assert not scoring.intervals(line(said, truth), unexplained=True)
+    left = line(said, truth, unexplained=[{"joints": ["a"], "share": 0.5}])
+    assert scoring.intervals(left, unexplained=True) == scoring.intervals(left)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from irb140_jax.mismatch import diagnose
-from irb140_jax.mismatch.output.notes import left_notes, rest_notes
+from irb140_jax.mismatch.output.notes import left_notes, recording_notes, rest_notes
 from irb140_jax.mismatch.validation.held_out import HeldOut
 from irb140_jax.mismatch.validation.undecided_joints import made_worse, undecidable
 from irb140_jax.recordings.low_pass import Band
@@ -36,6 +36,13 @@ def test_a_joint_is_told_of_by_enough_motion_and_a_small_residual(left, rows, sc
     torque = np.sqrt(2.0) * np.sin(np.linspace(0.0, 20.0 * np.pi, rows, endpoint=False))[:, None]
     sentences = undecidable(made.robot(pendulum=True), proof(left, rows), [torque], np.array([scatter]), BAND)
     assert (not sentences) if said is None else said in sentences[0]
+
+
+def test_who_knows_what_an_error_depends_on_is_not_told_to_check_columns():
+    torque = np.sqrt(2.0) * np.sin(np.linspace(0.0, 20.0 * np.pi, 2000, endpoint=False))[:, None]
+    given = made.robot(pendulum=True), proof(0.7, 2000), [torque], np.array([0.05]), BAND
+    assert "check its columns" in undecidable(*given)[0]
+    assert undecidable(*given, located=[0])[0].endswith("`unexplained` says what it depends on")
 
 
 @pytest.mark.parametrize(
@@ -120,3 +127,15 @@ def test_more_than_noise_that_depends_on_nothing_known_is_told(size, scatter, el
     assert len(notes) == told
     if told:
         assert "hinge 1 N m RMS (10 % of its torque), mostly from 0 to 2 s" in notes[0]
+
+
+def test_the_recording_that_holds_most_of_an_error_is_told_where_it_is_less_than_half_of_all():
+    rows = [np.full((k, 1), True) for k in (100, 60, 100)]
+    errors = lambda a, b: [np.full((len(u), 1), x) for u, x in zip(rows, (a, b, a), strict=True)]  # noqa: E731
+    told = lambda left, order=(0, 1, 2): recording_notes(  # noqa: E731
+        made.robot(pendulum=True), dataclasses.replace(proof(1.0, 100), corrected=left, recorded=rows, use=rows),
+        order, ("a.csv", "b.csv", "c.csv"), np.array([0.1]), np.array([10.0]))  # fmt: skip
+    (note,) = told(errors(0.2, 2.0))
+    assert "most of the square is in b.csv: 97 % on hinge" in note
+    assert not told(errors(2.0, 2.0)) and not told(errors(0.01, 0.1))
+    assert not told(errors(2.0, 0.1), (0, 1, 0))  # most of all rows

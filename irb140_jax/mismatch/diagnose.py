@@ -205,7 +205,7 @@ def _proved(
         progress("searching sets of explanations without what the motion speaks against")
         fewer = without_negligible(ex.without_sites(barred), data.servo)
         return _proved(data, fewer, sensors, stops, task)
-    found = findings(robot, ex, fit.amplitudes if fit else {})
+    found = findings(robot, ex, fit.amplitudes if fit else {}, rest)
     data, model, proof, harmful, by_laws = _in_motion(data, ex, corrected, left, fit) if fit else corrected
     bare = data
     if any(r.payload for r in data.smooth):  # the file that is written holds none

@@ -23,11 +23,13 @@ from irb140_jax.mismatch.output.notes import (
     inertial_notes,
     left_notes,
     notes,
+    recording_notes,
     rest_notes,
     slight_notes,
     timing_notes,
     unproved_notes,
 )
+from irb140_jax.mismatch.output.open_effects import OpenEffect, open_effects, open_notes
 from irb140_jax.mismatch.output.servos import (
     command_notes,
     gain_notes,
@@ -100,7 +102,8 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     """The diagnosis."""
     robot, scatter = of.data.robot, np.hypot(*of.sensors)
     logged = [s.tau for s in of.ex.data.stretches]
-    missing = undecidable(robot, of.proof, logged, scatter, of.data.band)
+    located = {s.joint for s in of.rest}
+    missing = undecidable(robot, of.proof, logged, scatter, of.data.band, located)
     weighed = any(r.payload for r in of.data.smooth)
     found = of_servos(of.ex, of.servo, [*of.findings, *torque_scale_finding(robot, of.ex, weighed)])
     fit, shifts = fit_by_joint(robot, of.proof, scatter), link_shifts(robot, of.ex)
@@ -109,14 +112,15 @@ def document(of: Found, origin: Provenance) -> Diagnosis:
     kind = verdict(of.ex, of.proof, found, of.rest, missing, blind)
     moving = fit_by_joint(robot, of.proof, scatter, at_rest=False)
     lacks = [*missing.values(), *([NO_FRICTION_SHOWS] if blind else [])]
-    said = summary(kind, found, of.rest, moving, shifts, robot, len(of.data.recordings), lacks, effects)
+    open_ = open_effects(of.ex, found)
+    said = summary(kind, found, of.rest, moving, shifts, robot, len(of.data.recordings), lacks, effects, open_)
     return rounded(Diagnosis(
         verdict=kind,
         findings=tuple(found),
         unexplained=tuple(_unexplained(robot, s, of.data.names) for s in of.rest),
         not_testable=not_testable(robot, found, of.seen, effects.values()),
         fit=fit,
-        notes=tuple(_notes(of, missing, torque_size(of.proof, logged))),
+        notes=tuple(_notes(of, missing, torque_size(of.proof, logged), open_)),
         provenance=origin,
         summary=said + servo_sentence(of.data.recordings),
     ))  # fmt: skip
@@ -248,7 +252,7 @@ def _mostly_of_joint(of: Found, j: int) -> list[str]:
     return _mostly(of.data.robot, axis, where, when, of.data.names)
 
 
-def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
+def _notes(of: Found, missing: dict[int, str], torque: np.ndarray, open_: Sequence[OpenEffect]) -> list[str]:
     """All notes, what matters most first; `torque` is the size of the joints' torque, shape (n,)."""
     robot, judged = of.data.robot, of.proof.judged
     gap = None if of.beyond is None else native_gap(of.beyond, of.data.band)
@@ -256,11 +260,13 @@ def _notes(of: Found, missing: dict[int, str], torque: np.ndarray) -> list[str]:
     channels = timing_notes(of.ex) if of.servo is None else [
         *motion_notes(robot, of.fit), *gain_notes(of.ex, of.servo), *command_notes(of.ex, of.servo)]
     open_joints = [f"{'; '.join([x[0].upper() + x[1:], *_mostly_of_joint(of, j)])}." for j, x in missing.items()]
+    recorded = [s.recording for s in of.ex.data.stretches]
     scatter, told = np.hypot(*of.sensors), {*missing, *(s.joint for s in (*of.rest, *of.slight))}
     return [
         *of.data.servo_notes, *link_encoder_notes(of.data, of.model, of.findings),
         *harmful_notes(robot, of.harmful), *open_joints,
-        *rest_notes(robot, of.proof, scatter), *slight_notes(robot, of.slight),
+        *recording_notes(robot, of.proof, recorded, of.data.names, scatter, torque),
+        *open_notes(open_), *rest_notes(robot, of.proof, scatter), *slight_notes(robot, of.slight),
         *left_notes(robot, of.proof, scatter, torque, told, partial(_mostly_of_joint, of)),
         *unproved_notes(of.ex, of.seen, servo=of.servo is not None), *inertial_notes(of.ex, of.uncertainty),
         *friction_notes(of.ex, of.data.names, judged),

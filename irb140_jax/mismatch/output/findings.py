@@ -1,7 +1,7 @@
 """From an explanation to findings: parameters with intervals, evidence, and alternatives."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,10 +15,13 @@ from irb140_jax.mismatch.selection.explanation import Explanation, parts
 from irb140_jax.mismatch.selection.torque_scale import scale_log_odds
 from irb140_jax.mismatch.validation.held_out import held_out_gains
 from irb140_jax.mismatch.validation.intervals import parameters_of, physical_of
+from irb140_jax.mismatch.validation.unexplained import Structure
 from irb140_jax.robot import Robot
 
 
-def findings(robot: Robot, ex: Explanation, in_motion: Mapping[int, np.ndarray]) -> list[Finding]:
+def findings(
+    robot: Robot, ex: Explanation, in_motion: Mapping[int, np.ndarray], rest: Sequence[Structure] = ()
+) -> list[Finding]:
     """The findings, strongest first.
 
     Args:
@@ -26,7 +29,11 @@ def findings(robot: Robot, ex: Explanation, in_motion: Mapping[int, np.ndarray])
         ex: The explanation.
         in_motion: Amplitudes that were fitted to the motion, by candidate.  By how much they differ from those of the
             torque is added to the standard deviations: two views of one law.
+        rest: Structure that no effect explains.
     """
+    unexplained = np.zeros(robot.n)
+    for s in rest:
+        unexplained[s.joint] = max(unexplained[s.joint], s.rms)
     post = ex.posterior()
     w = post.mean * ex.data.scale[post.columns]
     cov = post.cov * np.outer(ex.data.scale[post.columns], ex.data.scale[post.columns])
@@ -36,7 +43,7 @@ def findings(robot: Robot, ex: Explanation, in_motion: Mapping[int, np.ndarray])
         if c.is_inertials:
             continue
         own, spread = w[rows], cov[rows, rows]
-        values = parameters_of(robot, ex, index, own, spread)
+        values = parameters_of(robot, ex, index, own, spread, unexplained)
         if index in in_motion:
             own = in_motion[index]
             values = _in_motion(c, values, own)

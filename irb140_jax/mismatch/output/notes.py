@@ -86,8 +86,7 @@ def left_notes(
         told: Joints of which something else is said.
         mostly: Where and when most of a joint's error is.
     """
-    left = proof.rmse(proof.corrected)
-    much = left > np.maximum(settings.MATERIAL_TORQUE * torque, settings.ABOVE_NOISE * scatter)
+    left, much = proof.rmse(proof.corrected), _much_left(proof, scatter, torque)
     said = [
         ", ".join([_size(robot, int(j), left[j], left[j] / max(torque[j], 1e-300)), *mostly(int(j))])
         for j in np.flatnonzero(proof.judged & much)
@@ -99,6 +98,44 @@ def left_notes(
         "Not all of the torque is explained, and what the rest depends on was not found. While the joint "
         f"moves, the corrected model leaves more than the noise of the sensors on unseen data: {'; '.join(said)}."
     ]
+
+
+def recording_notes(
+    robot: Robot, proof: HeldOut, recordings: Sequence[int], names: Sequence[str], scatter: np.ndarray,
+    torque: np.ndarray,
+) -> list[str]:  # fmt: skip
+    """A note on each recording that holds most of the error of some joints, though fewer than half of the rows.
+
+    Args:
+        robot: The nominal model.
+        proof: Errors on unseen data.
+        recordings: Which recording each array of it is of.
+        names: Of the recordings.
+        scatter: Of the sensors, shape (n,) [N m or N].
+        torque: Size of the joints' torque, shape (n,).
+    """
+    size = (len(names), robot.n)
+    squares, rows = np.zeros(size), np.zeros(size)
+    for i, r, use in zip(recordings, proof.corrected, proof.use, strict=True):
+        squares[i] += np.sum(np.where(use, r, 0.0) ** 2, axis=0)
+        rows[i] += use.sum(axis=0)
+    share = squares / np.maximum(squares.sum(axis=0), 1e-300)
+    much = proof.judged & _much_left(proof, scatter, torque)
+    alone = much & (share >= settings.MOST_OF_ERROR) & (2.0 * rows < rows.sum(axis=0))
+    return [
+        f"Of what the corrected model leaves on unseen data while the joint moves, most of the square is in {name}: "
+        + ", ".join(f"{100 * share[i, j]:.0f} % on {robot.joint_names[j]}" for j in np.flatnonzero(alone[i]))
+        + ". Either the motion is another there, or the machine was: another tool, load or zero. The other recordings "
+        "without it will show."
+        for i, name in enumerate(names)
+        if alone[i].any()
+    ]
+
+
+def _much_left(proof: HeldOut, scatter: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """Joints whose error is material and more than the sensors' scatter, shape (n,)."""
+    left = proof.rmse(proof.corrected)
+    return left > np.maximum(settings.MATERIAL_TORQUE * torque, settings.ABOVE_NOISE * scatter)
 
 
 def slight_notes(robot: Robot, slight: Sequence[Structure]) -> list[str]:

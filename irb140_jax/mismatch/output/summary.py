@@ -7,6 +7,7 @@ import numpy as np
 from irb140_jax.effects import Effect
 from irb140_jax.mismatch import settings
 from irb140_jax.mismatch.output.inertials import LinkShift
+from irb140_jax.mismatch.output.open_effects import OpenEffect
 from irb140_jax.mismatch.regression.gaussian import eliminated, gain_of
 from irb140_jax.mismatch.result import Finding, Fit, Verdict
 from irb140_jax.mismatch.selection.explanation import Explanation
@@ -60,11 +61,12 @@ def _inertials_matter(ex: Explanation) -> bool:
 def summary(
     kind: Verdict, found: Sequence[Finding], rest: Sequence[Structure], fit: dict[str, Fit],
     inertials: Sequence[LinkShift], robot: Robot, recordings: int, missing: Iterable[str],
-    effects: Mapping[str, Effect],
+    effects: Mapping[str, Effect], open_: Sequence[OpenEffect] = (),
 ) -> str:  # fmt: skip
     """A short paragraph for a person; `missing` are sentences on the data that a decision would need.
 
-    Effects go by their titles, by slug. `fit` is while joints move: at rest dry friction is undetermined.
+    Effects go by their titles, by slug. `fit` is while joints move: at rest dry friction is undetermined.  `open_` is
+    what the recordings can't decide.
     """
     what = _counted(recordings, robot)
     show = f"{what} show{'s' if recordings == 1 else ''}"
@@ -97,6 +99,9 @@ def summary(
             said.append(
                 f"{_capital(title)} on {joints} may instead be {rivals}, in whole or in part; these data can't tell."
             )
+    if open_:
+        more = _listed([f"{o.effect.title} on {_listed(o.joints)}" for o in open_], "or")
+        said.append(f"These data leave open whether there is also {more}.")
     changed = [i for i in inertials if i.sentence]
     if len(changed) > settings.FEW_LINKS:
         said.append(f"Refitting changes the inertial parameters of the links behind "

@@ -1,6 +1,7 @@
 """Does it hold on data that the fit did not see?  Motions, or blocks of a single one, are left out in turn."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -241,7 +242,7 @@ def held_out_gains(ex: Explanation) -> dict[int, float]:
 
 
 def unproved(ex: Explanation) -> list[Site]:
-    """The rare effect against which motions speak most, if what they say is substantial.
+    """The rare effects against which motions speak, if what they say is substantial, also without those that are worse.
 
     Evidence trusts that some law is true.  Where none of them knows what the model errs by, one may fit all the same,
     and motions that the fit did not see tell: by how many nats they are less probable with it, each joint's error as
@@ -249,10 +250,20 @@ def unproved(ex: Explanation) -> list[Site]:
     tells of, the same is asked of what the fit saw: a law that is only wanted for what it undoes of the discrepancy
     makes the error larger there, too.
     """
+    against = _against(ex, [i for i in ex.chosen if _is_rare(ex, i)])
+    out: list[int] = []
+    for i in sorted(against, key=lambda i: -against[i]):
+        left = dataclasses.replace(ex, chosen=tuple(k for k in ex.chosen if k not in out))
+        if not out or _against(left, [i]):
+            out.append(i)
+    return [site_of(ex.data.candidates[i]) for i in out]
+
+
+def _against(ex: Explanation, findings: Sequence[int]) -> dict[int, float]:
+    """By how many nats motions speak against each of some findings, where that is substantial."""
     errors = _Errors(ex, _motions(ex))
-    against = {i: errors.against(i) for i in ex.chosen if _is_rare(ex, i)}
-    worst = sorted(against, key=lambda i: -against[i])[:1]
-    return [site_of(ex.data.candidates[i]) for i in worst if against[i] > settings.SUBSTANTIAL]
+    nats = {i: errors.against(i) for i in findings}
+    return {i: x for i, x in nats.items() if x > settings.SUBSTANTIAL}
 
 
 def _is_rare(ex: Explanation, index: int) -> bool:
@@ -268,7 +279,8 @@ class _Errors:
     Attributes:
         ex: The explanation.
         left_out: Blocks that are left out together.
-        whole: Errors with all that is found, by the explanation that judges and the inertials' width: filled as asked.
+        whole: Errors with all that is found, by whether the explanation judges itself and by the inertials' width:
+            filled as asked.
     """
 
     ex: Explanation
@@ -281,22 +293,37 @@ class _Errors:
         Inertials may be as far off in both as they have to be without it: else what differs is how well they stand in
         for anything, and not what the finding says.
         """
-        judge, site = self.ex.judged_by(index), site_of(self.ex.data.candidates[index])
-        fewer = judge.others(next(k for k in judge.chosen if site_of(judge.data.candidates[k]) == site)) + instead
-        key = judge is self.ex, judge.space.width(fewer, judge.hyper)
-        if key not in self.whole:
-            self.whole[key] = _unseen_errors(judge, judge.chosen, self.left_out, key[1])
-        return self.whole[key], _unseen_errors(judge, fewer, self.left_out, key[1])
+        judge, fewer = self._without(index, instead)
+        width = judge.space.width(fewer, judge.hyper)
+        return self._with(judge, width), _unseen_errors(judge, fewer, self.left_out, width)
 
     def against(self, index: int) -> float:
         """By how many nats data are less probable with a finding than without it, or with usual friction in its place.
+
+        With it, inertials may be as far off as they have to be without it or as they have to be with it, whichever
+        errs less: beside an offset, a weight that may be anything only blurs what either of them is.
         """
         rows = np.array([float(g.rows.sum()) for g in self.ex.by_block.joints])
         nats = []
         for usual in {(), usual_in_its_place(self.ex.data.candidates, self.ex.chosen, index)}:
-            whole, without = self.with_and_without(index, usual)
-            nats.append(0.5 * float(np.sum(rows * np.log((whole + 1e-300) / (without + 1e-300)))))
+            alike, without = self.with_and_without(index, usual)
+            judge, _ = self._without(index, usual)
+            whole = (alike, self._with(judge, judge.space.width(judge.chosen, judge.hyper)))
+            nats.append(min(0.5 * float(np.sum(rows * np.log((x + 1e-300) / (without + 1e-300)))) for x in whole))
         return max(nats) + float(self.ex.space.lost([index], self.ex.hyper)[0])
+
+    def _without(self, index: int, instead: tuple[int, ...]) -> tuple[Explanation, tuple[int, ...]]:
+        """The explanation that judges a finding, and its set with others or nothing in the finding's place."""
+        judge, site = self.ex.judged_by(index), site_of(self.ex.data.candidates[index])
+        named = next(k for k in judge.chosen if site_of(judge.data.candidates[k]) == site)
+        return judge, judge.others(named) + instead
+
+    def _with(self, judge: Explanation, width: float) -> np.ndarray:
+        """Errors with all that is found, by an explanation and the inertials' width."""
+        key = judge is self.ex, width
+        if key not in self.whole:
+            self.whole[key] = _unseen_errors(judge, judge.chosen, self.left_out, width)
+        return self.whole[key]
 
 
 def _unseen_errors(ex: Explanation, chosen: tuple[int, ...], left_out: list[np.ndarray], width: float) -> np.ndarray:

@@ -19,7 +19,7 @@ FAR = 1e5  # steps of the grid: prior standard deviation of a shape where nothin
 
 
 def parameters_of(
-    robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray
+    robot: Robot, ex: Explanation, index: int, w: np.ndarray, cov: np.ndarray, unexplained: np.ndarray
 ) -> dict[str, Estimate]:
     """Physical parameters and their standard deviations: amplitudes at the named shape, and the shape's own doubt.
 
@@ -29,6 +29,7 @@ def parameters_of(
         index: The finding among its candidates.
         w: Amplitudes of the finding, shape (k,).
         cov: Their covariance, shape (k, k).
+        unexplained: RMS of the structure on each joint that no effect explains, shape (n,) [N m or N].
 
     Returns:
         By the parameter's name, in SI units.
@@ -36,8 +37,7 @@ def parameters_of(
     c = ex.data.candidates[index]
     value = physical_of(c, w)
     over_shapes = np.maximum(_variance_over_shapes(ex, index, value), _variance_about_shape(ex, index, w))
-    if c.effect.law.empirical:
-        cov = cov + _of_form(ex, c, w)
+    cov = cov + _of_form(ex, c, w, unexplained)
     w, cov = _of_all_columns(ex, index, w, cov)
     if index in ex.falls:
         # What makes it what it is counts as the speed nears zero, where the discrepancy counts, too.
@@ -58,15 +58,20 @@ def parameters_of(
     }
 
 
-def _of_form(ex: Explanation, c: Candidate, w: np.ndarray) -> np.ndarray:
-    """Covariance of amplitudes (k,) where the law is of another form: `USUAL_MISFIT` of its own torque.
+def _of_form(ex: Explanation, c: Candidate, w: np.ndarray, unexplained: np.ndarray) -> np.ndarray:
+    """Covariance of amplitudes (k,) where the law is of another form, or took what no effect explains for its own.
 
-    A misfit that looks like the law itself is in no discrepancy.  Any torque that its columns have is equally probable.
+    A misfit that looks like the law itself is in no discrepancy: of a law of experience, `USUAL_MISFIT` of its torque.
+    And of a structure that no effect explains, friction or a law of experience may hold as much as is left of it.  Any
+    torque that the columns have is equally probable.
     """
-    columns = ex.data.nuisances + c.columns
+    columns, law = ex.data.nuisances + c.columns, c.effect.law
     X = np.concatenate([s.of(columns, j)[s.use[:, j]] for s in ex.data.stretches for j in c.joints])
     G = X.T @ X
-    return settings.USUAL_MISFIT**2 * float(w @ G @ w) / len(w) * np.linalg.pinv(G, rcond=1e-9, hermitian=True)
+    energy = settings.USUAL_MISFIT**2 * float(w @ G @ w) if law.empirical else 0.0
+    if len(c.joints) == 1 and (law.empirical or c.effect.place.is_friction):  # of several joints others tell, too
+        energy += float(unexplained[c.joints[0]]) ** 2 * len(X)
+    return energy / len(w) * np.linalg.pinv(G, rcond=1e-9, hermitian=True)
 
 
 def _variance_of(

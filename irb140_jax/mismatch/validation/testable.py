@@ -121,7 +121,7 @@ def visibility(ex: Explanation, matters: Reference) -> Seen:
     H = ex.near(ex.chosen, np.arange(len(ex.data.scale) - ex.data.nuisances))
     seen: Seen = {}
     for i, c in enumerate(ex.data.candidates):
-        if c.is_inertials or any(_related(c, m) for m in ex.members):
+        if c.is_inertials or any(is_part_of(c, m) for m in ex.members):
             continue
         if c.effect.shapes.proposal and not matters.amplitudes[c.columns].any():
             continue  # a wall or a push at no place or time in particular
@@ -156,7 +156,7 @@ def stands_out(
     return float(np.sqrt(max(size, 0.0)))
 
 
-def _related(one: AtSite, member: AtSite) -> bool:
+def is_part_of(one: AtSite, member: AtSite) -> bool:
     """Whether an effect is a named one or a part of it."""
     a, b = one.effect, member.effect
     return one.joints == member.joints and (a.slug == b.slug or a.slug in b.law.contains)

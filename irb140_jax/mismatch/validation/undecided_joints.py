@@ -1,6 +1,6 @@
 """Joints whose motion is too short, or whose remaining error is too large, to tell whether anything is left out."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -41,8 +41,9 @@ def without_effects(proof: HeldOut) -> np.ndarray:
 
 
 def undecidable(
-    robot: Robot, proof: HeldOut, torque: Sequence[np.ndarray], scatter: np.ndarray, band: Band
-) -> dict[int, str]:
+    robot: Robot, proof: HeldOut, torque: Sequence[np.ndarray], scatter: np.ndarray, band: Band,
+    located: Collection[int] = (),
+) -> dict[int, str]:  # fmt: skip
     """Joints of which these recordings can't tell whether anything is left out, each with a sentence why.
 
     Args:
@@ -51,26 +52,26 @@ def undecidable(
         torque: Logged torque, low-passed, one array (R, n) per recording.
         scatter: What the sensors leave, shape (n,).
         band: Of the comparison.
+        located: Joints of which it is said what the remaining error depends on: their columns are what they should be.
     """
     size, left = torque_size(proof, torque), proof.rmse(proof.corrected)
     seconds = np.sum([u.sum(axis=0) for u in proof.use], axis=0) * band.step / band.rate
     out = {}
     for j in np.flatnonzero(proof.judged):
         name, unit = robot.joint_names[j], robot.torque_units[j]
+        times = f"{digits(left[j] / max(scatter[j], 1e-300))} times the noise of the sensors"
+        share = f"{100 * left[j] / max(size[j], 1e-300):.0f} % of its torque"
+        error = f"the remaining error of {name}, {left[j]:.3g} {unit}, is"
+        depends = "`unexplained` says what it depends on" if j in located else ""
         if seconds[j] < settings.FEWEST_SECONDS:
             out[int(j)] = (
                 f"{name} moves for only {seconds[j]:.2g} s: record at least {settings.FEWEST_SECONDS:g} s in which it "
                 "moves, better 20 s with a dozen reversals"
             )
         elif left[j] > settings.LARGE_ERROR * size[j]:
-            out[int(j)] = (
-                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {100 * left[j] / max(size[j], 1e-300):.0f} % "
-                "of its torque and may hide anything: check its columns and units, and record faster or longer motion"
-            )
+            what = depends or "check its columns and units, and record faster or longer motion"
+            out[int(j)] = f"{error} {share} and may hide anything: {what}"
         elif left[j] > max(settings.NOT_SMALL * size[j], settings.ABOVE_NOISE * scatter[j]):
-            times, share = left[j] / max(scatter[j], 1e-300), 100 * left[j] / max(size[j], 1e-300)
-            out[int(j)] = (
-                f"the remaining error of {name}, {left[j]:.3g} {unit}, is {digits(times)} times the noise of the "
-                f"sensors and {share:.0f} % of its torque: check its columns, and record longer motion"
-            )
+            what = depends or "check its columns, and record longer motion"
+            out[int(j)] = f"{error} {times} and {share}: {what}"
     return out
