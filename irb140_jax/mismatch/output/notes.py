@@ -123,10 +123,10 @@ def recording_notes(
     much = proof.judged & _much_left(proof, scatter, torque)
     alone = much & (share >= settings.MOST_OF_ERROR) & (2.0 * rows < rows.sum(axis=0))
     return [
-        f"Of what the corrected model leaves on unseen data while the joint moves, most of the square is in {name}: "
+        f"Most of the squared error of the corrected model on unseen data, while the joint moves, is in {name}: "
         + ", ".join(f"{100 * share[i, j]:.0f} % on {robot.joint_names[j]}" for j in np.flatnonzero(alone[i]))
-        + ". Either the motion is another there, or the machine was: another tool, load or zero. The other recordings "
-        "without it will show."
+        + ". Either the motion differs there, or the machine did, with another tool, load or zero: diagnose the other "
+        "recordings without this one."
         for i, name in enumerate(names)
         if alone[i].any()
     ]

@@ -1,4 +1,4 @@
-"""Effects that are not named and that these recordings do not speak against: neither there nor not there."""
+"""Effects that these recordings can neither name nor rule out."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -242,7 +242,7 @@ def held_out_gains(ex: Explanation) -> dict[int, float]:
 
 
 def unproved(ex: Explanation) -> list[Site]:
-    """The rare effects against which motions speak, if what they say is substantial, also without those that are worse.
+    """Rare effects against which motions speak substantially, each of them also once the worse ones are left out.
 
     Evidence trusts that some law is true.  Where none of them knows what the model errs by, one may fit all the same,
     and motions that the fit did not see tell: by how many nats they are less probable with it, each joint's error as
@@ -279,23 +279,22 @@ class _Errors:
     Attributes:
         ex: The explanation.
         left_out: Blocks that are left out together.
-        whole: Errors with all that is found, by whether the explanation judges itself and by the inertials' width:
-            filled as asked.
+        whole: Errors with all that is found, by whether `ex` itself judges and the inertials' width: filled as asked.
     """
 
     ex: Explanation
     left_out: list[np.ndarray]
     whole: dict[tuple[bool, float], np.ndarray] = dataclasses.field(default_factory=dict)
 
-    def with_and_without(self, index: int, instead: tuple[int, ...] = ()) -> tuple[np.ndarray, np.ndarray]:
-        """Whitened squared error by joint with a finding, and with others or nothing in its place, (n,) each.
+    def with_and_without(self, index: int) -> tuple[np.ndarray, np.ndarray]:
+        """Whitened squared error by joint with a finding and without it, shape (n,) each.
 
         Inertials may be as far off in both as they have to be without it: else what differs is how well they stand in
         for anything, and not what the finding says.
         """
-        judge, fewer = self._without(index, instead)
+        judge, fewer = self._judge_and_rest(index)
         width = judge.space.width(fewer, judge.hyper)
-        return self._with(judge, width), _unseen_errors(judge, fewer, self.left_out, width)
+        return self._of_all(judge, width), _unseen_errors(judge, fewer, self.left_out, width)
 
     def against(self, index: int) -> float:
         """By how many nats data are less probable with a finding than without it, or with usual friction in its place.
@@ -303,23 +302,22 @@ class _Errors:
         With it, inertials may be as far off as they have to be without it or as they have to be with it, whichever
         errs less: beside an offset, a weight that may be anything only blurs what either of them is.
         """
-        rows = np.array([float(g.rows.sum()) for g in self.ex.by_block.joints])
-        nats = []
+        rows, nats = np.array([float(g.rows.sum()) for g in self.ex.by_block.joints]), []
+        judge, rest = self._judge_and_rest(index)
         for usual in {(), usual_in_its_place(self.ex.data.candidates, self.ex.chosen, index)}:
-            alike, without = self.with_and_without(index, usual)
-            judge, _ = self._without(index, usual)
-            whole = (alike, self._with(judge, judge.space.width(judge.chosen, judge.hyper)))
-            nats.append(min(0.5 * float(np.sum(rows * np.log((x + 1e-300) / (without + 1e-300)))) for x in whole))
+            widths = [judge.space.width(members, judge.hyper) for members in (rest + usual, judge.chosen)]
+            without = _unseen_errors(judge, rest + usual, self.left_out, widths[0])
+            ratios = [(self._of_all(judge, width) + 1e-300) / (without + 1e-300) for width in widths]
+            nats.append(min(0.5 * float(np.sum(rows * np.log(ratio))) for ratio in ratios))
         return max(nats) + float(self.ex.space.lost([index], self.ex.hyper)[0])
 
-    def _without(self, index: int, instead: tuple[int, ...]) -> tuple[Explanation, tuple[int, ...]]:
-        """The explanation that judges a finding, and its set with others or nothing in the finding's place."""
+    def _judge_and_rest(self, index: int) -> tuple[Explanation, tuple[int, ...]]:
+        """The explanation that judges a finding, and its set without the finding."""
         judge, site = self.ex.judged_by(index), site_of(self.ex.data.candidates[index])
-        named = next(k for k in judge.chosen if site_of(judge.data.candidates[k]) == site)
-        return judge, judge.others(named) + instead
+        return judge, judge.others(next(k for k in judge.chosen if site_of(judge.data.candidates[k]) == site))
 
-    def _with(self, judge: Explanation, width: float) -> np.ndarray:
-        """Errors with all that is found, by an explanation and the inertials' width."""
+    def _of_all(self, judge: Explanation, width: float) -> np.ndarray:
+        """Errors with all that is found, shape (n,), by an explanation and the inertials' width."""
         key = judge is self.ex, width
         if key not in self.whole:
             self.whole[key] = _unseen_errors(judge, judge.chosen, self.left_out, width)

@@ -61,8 +61,8 @@ def parameters_of(
 def _of_form(ex: Explanation, c: Candidate, w: np.ndarray, unexplained: np.ndarray) -> np.ndarray:
     """Covariance of amplitudes (k,) where the law is of another form, or took what no effect explains for its own.
 
-    A misfit that looks like the law itself is in no discrepancy: of a law of experience, `USUAL_MISFIT` of its torque.
-    And of a structure that no effect explains, friction or a law of experience may hold as much as is left of it.  Any
+    A misfit that looks like the law itself is in no discrepancy: `USUAL_MISFIT` of an empirical law's own torque.  And
+    friction, like any empirical law, may hold as much of a structure that no effect explains as is left of it.  Any
     torque that the columns have is equally probable.
     """
     columns, law = ex.data.nuisances + c.columns, c.effect.law

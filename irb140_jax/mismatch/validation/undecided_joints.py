@@ -52,7 +52,7 @@ def undecidable(
         torque: Logged torque, low-passed, one array (R, n) per recording.
         scatter: What the sensors leave, shape (n,).
         band: Of the comparison.
-        located: Joints of which it is said what the remaining error depends on: their columns are what they should be.
+        located: Joints of which it is said what the remaining error depends on.
     """
     size, left = torque_size(proof, torque), proof.rmse(proof.corrected)
     seconds = np.sum([u.sum(axis=0) for u in proof.use], axis=0) * band.step / band.rate
@@ -62,16 +62,15 @@ def undecidable(
         times = f"{digits(left[j] / max(scatter[j], 1e-300))} times the noise of the sensors"
         share = f"{100 * left[j] / max(size[j], 1e-300):.0f} % of its torque"
         error = f"the remaining error of {name}, {left[j]:.3g} {unit}, is"
-        depends = "`unexplained` says what it depends on" if j in located else ""
+        depends = "`unexplained` says what it depends on; " if j in located else ""
         if seconds[j] < settings.FEWEST_SECONDS:
             out[int(j)] = (
                 f"{name} moves for only {seconds[j]:.2g} s: record at least {settings.FEWEST_SECONDS:g} s in which it "
                 "moves, better 20 s with a dozen reversals"
             )
         elif left[j] > settings.LARGE_ERROR * size[j]:
-            what = depends or "check its columns and units, and record faster or longer motion"
-            out[int(j)] = f"{error} {share} and may hide anything: {what}"
+            remedy = "check its columns and units, and record faster or longer motion"
+            out[int(j)] = f"{error} {share} and may hide anything: {depends}{remedy}"
         elif left[j] > max(settings.NOT_SMALL * size[j], settings.ABOVE_NOISE * scatter[j]):
-            what = depends or "check its columns, and record longer motion"
-            out[int(j)] = f"{error} {times} and {share}: {what}"
+            out[int(j)] = f"{error} {times} and {share}: {depends}check its columns, and record longer motion"
     return out
